@@ -260,7 +260,7 @@ impl Model for PmsmDrive {
         let (plant, controller) = (&self.pair.plant.model.parameters, &self.pair.controller.model.parameters);
         same_pole_pairs(plant, controller)?;
         known_carrier(plant, controller)?;
-        check_saturation(plant, controller.limit.i).map_err(|fault| in_part("plant", &fault))?;
+        check_saturation(plant, controller).map_err(|fault| in_part("plant", &fault))?;
         self.derating.validate()?;
         let starts = self.pair.controller.model.samples() == 0;
         self.link_parameters.validate(if starts { self.inputs.u_dc } else { 0.0 })?;

@@ -11,6 +11,7 @@ use drive_base::frame::{Axis, Dq, Rotor, Stator, Vector};
 use drive_base::math::reciprocal;
 use drive_base::motor::Motor;
 use fmu_core::Scalar;
+use fmu_core::log::Warnings;
 use serde::{Deserialize, Serialize};
 
 /// Flux linkage (Wb) for the current `i` (A) without saturation.
@@ -28,6 +29,34 @@ pub enum Magnetics<'a> {
     Polynomial(&'a Saturation),
     /// By a map.
     Map(&'a FluxMap),
+}
+
+impl Magnetics<'_> {
+    /// Warns of a flux linkage `psi` (Wb) beyond the map, or one at which the polynomial describes no machine.
+    pub fn warn(self, motor: &Motor, psi: Dq, log: &mut Warnings<'_>) {
+        let (d, q) = (psi.d(), psi.q());
+        match self {
+            Magnetics::Map(map) if !map.holds(psi - Dq::new(motor.psi_M, 0.0)) => log.warn("flux_map", || {
+                format!(
+                    "psi_d = {d} Wb, psi_q = {q} Wb is beyond the flux map, which continues with the inductances of its edge; limit the \
+                     current, or fit a map to a table with larger currents"
+                )
+            }),
+            Magnetics::Polynomial(saturation) if !is_stable(saturation.slope(motor, psi)) => log.warn("saturation", || {
+                format!(
+                    "psi_d = {d} Wb, psi_q = {q} Wb: here the saturation (s_2, s_3, s_dq) describes no machine, because more flux needs \
+                     less current, and the results are wrong; use coefficients closer to 0, limit the current, or use a flux map"
+                )
+            }),
+            _ => {}
+        }
+    }
+}
+
+/// Whether more flux linkage needs more current in every direction, with this [`slope`].
+#[inline]
+pub fn is_stable([d, cross, q]: [f64; 3]) -> bool {
+    d > 0.0 && d * q > cross * cross
 }
 
 /// Current (A) for the flux linkage `psi` (Wb).

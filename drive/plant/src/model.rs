@@ -290,16 +290,8 @@ impl PmsmPlant {
 
 impl Warns for PmsmPlant {
     fn warn(&self, log: &mut Warnings<'_>) {
-        let (map, psi) = (&self.parameters.flux_map, self.state.psi);
-        if map.used && !map.holds(psi - Dq::new(self.warm.motor.psi_M, 0.0)) {
-            log.warn("flux_map", || {
-                format!(
-                    "psi_d = {} Wb, psi_q = {} Wb is beyond the flux map, which continues with the inductances of its edge; limit the \
-                     current, or fit a map to a table with larger currents",
-                    psi.d(),
-                    psi.q()
-                )
-            });
+        if !self.parameters.is_linear() {
+            self.parameters.magnetics().warn(&self.warm.motor, self.state.psi, log);
         }
     }
 }

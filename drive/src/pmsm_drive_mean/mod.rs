@@ -370,7 +370,7 @@ impl Model for PmsmDriveMean {
         self.plant().validate().map_err(|fault| in_part("plant", &fault))?;
         let Steady { plant, controller, .. } = &self.drive;
         same_pole_pairs(plant, controller)?;
-        check_saturation(plant, controller.limit.i).map_err(|fault| in_part("plant", &fault))?;
+        check_saturation(plant, controller).map_err(|fault| in_part("plant", &fault))?;
         self.drive.derating.validate()?;
         let u_dc = if self.moved { 0.0 } else { self.inputs.u_dc };
         self.drive.controller.validate_limits(u_dc).map_err(|fault| in_part("controller", &fault))?;
@@ -423,7 +423,7 @@ impl Model for PmsmDriveMean {
         }
         let Passed { state, powers, point } = self.pass(step.h, temperatures)?;
         if !all_finite([state.tau, state.integral, state.speed, state.angle, powers.p_in, powers.p_loss]) {
-            return Err(Fault::new(format!("the drive's state is no longer finite after a step of {} s", step.h)));
+            return Err(self.diverged(step.h, &point));
         }
         let total = Energy::from(powers);
         self.energy.add(&Energy { r#in: total.r#in * step.h, mech: total.mech * step.h, loss: total.loss * step.h });
@@ -446,6 +446,18 @@ impl Model for PmsmDriveMean {
 }
 
 impl PmsmDriveMean {
+    /// Refuses a step of `h` (s) that ends at this `point`.
+    #[cold]
+    fn diverged(&self, h: f64, point: &Point) -> Fault {
+        let cause = if point.psi.d().is_nan() && !self.drive.plant.is_linear() {
+            ": no flux linkage has the current of this speed; plant.saturation (s_2, s_3, s_dq) describes a machine only up to smaller \
+             currents: use coefficients closer to 0, or plant.flux_map"
+        } else {
+            ""
+        };
+        Fault::new(format!("the drive's state is no longer finite after a step of {h} s{cause}"))
+    }
+
     /// Whether no drive can operate like this: no current fits the voltage of the link, or its source cannot supply the power.
     fn is_impossible(&self) -> bool {
         let p_in = self.point.powers.p_in;
@@ -487,6 +499,11 @@ impl Warns for PmsmDriveMean {
         }
         if self.clipped_for >= 1.0 {
             log.warn("tau_ref", || clipped(self.inputs.tau_ref, self.limits(&self.state, &self.point)));
+        }
+        let plant = &self.drive.plant;
+        if !plant.is_linear() {
+            let motor = plant.thermal.motor(&plant.motor, &self.temperatures());
+            plant.magnetics().warn(&motor, self.point.psi, log);
         }
     }
 }

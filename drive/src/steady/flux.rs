@@ -9,7 +9,9 @@
 use drive_base::frame::Dq;
 use drive_base::math::sin_cos;
 use drive_base::motor::Motor;
-use drive_plant::machine::{self, Magnetics};
+use drive_control::estimator::contract::Class;
+use drive_control::tables::ControllerParameters;
+use drive_plant::machine::{self, Magnetics, is_stable};
 use drive_plant::tables::{PARAMETERS, PlantParameters};
 use fmu_core::Fault;
 
@@ -41,13 +43,14 @@ pub(super) fn linkage(motor: &Motor, magnetics: Magnetics<'_>, i_s: Dq, (h, g): 
         if !linear && (size <= SMALL || size <= ROUNDED && size >= last) {
             return psi;
         }
-        let [d, cross, q] = machine::slope(motor, magnetics, psi);
+        let slope = machine::slope(motor, magnetics, psi);
         // More flux needs more current in a machine, and Newton's step then lowers the residue; too long a step is halved.
-        if !(d > 0.0 && d * q > cross * cross && size < last) {
+        if !(is_stable(slope) && size < last) {
             psi = (psi + before) * 0.5;
             continue;
         }
         (last, before) = (size, psi);
+        let [d, cross, q] = slope;
         let (d, q, above, below) = (d + h, q + h, cross - g, cross + g);
         let by = 1.0 / (d * q - above * below);
         let step = Dq::new(q * rest.d() - above * rest.q(), d * rest.q() - below * rest.d()) * by;
@@ -59,23 +62,28 @@ pub(super) fn linkage(motor: &Motor, magnetics: Magnetics<'_>, i_s: Dq, (h, g): 
     Dq::new(f64::NAN, f64::NAN)
 }
 
-/// Refuses a saturation that describes no machine at currents of `limit` (A).
+/// Refuses a saturation that describes no machine at the maximum current of the `controller`, or at the current of its low-speed law.
 ///
 /// # Errors
 /// A current that no flux linkage gives, because more flux would need less current.
-pub(crate) fn check_saturation(plant: &PlantParameters, limit: f64) -> Result<(), Fault> {
+pub(crate) fn check_saturation(plant: &PlantParameters, controller: &ControllerParameters) -> Result<(), Fault> {
     if plant.saturation.is_none() {
         return Ok(());
     }
-    let motor = &plant.motor;
-    for angle in ANGLES {
+    let (motor, limit) = (&plant.motor, &controller.limit);
+    let most = ANGLES.map(|angle| {
         let (sin, cos) = sin_cos(if motor.L_d > motor.L_q { 180.0 - angle } else { angle }.to_radians());
-        let i = Dq::new(limit * cos, limit * sin);
+        (Dq::new(limit.i * cos, limit.i * sin), "controller.limit.i", limit.i)
+    });
+    let i_0 = controller.zero_speed.i_0;
+    let law = (Dq::new(i_0, limit.i_q_beside(i_0)), "controller.zero_speed.i_0", i_0);
+    let has_law = controller.estimator.class() == Class::FluxObserver;
+    for (i, name, value) in most.into_iter().chain(has_law.then_some(law)) {
         if linkage(motor, plant.magnetics(), i, (0.0, 0.0)).d().is_nan() {
             let tell = |get: fn(&mut PlantParameters) -> &mut f64| PARAMETERS.tell(plant, get);
             return Err(Fault::new(format!(
-                "{} with {} and {}: these describe no machine up to controller.limit.i = {limit} A, because at i_d = {:.3} A and i_q = \
-                 {:.3} A, more flux needs less current; use coefficients closer to 0, or a lower limit",
+                "{} with {} and {}: these describe no machine up to {name} = {value} A, because at i_d = {:.3} A and i_q = {:.3} A, \
+                 more flux needs less current; use coefficients closer to 0, or a lower limit",
                 tell(|p| &mut p.saturation.s_2),
                 tell(|p| &mut p.saturation.s_3),
                 tell(|p| &mut p.saturation.s_dq),
@@ -90,6 +98,7 @@ pub(crate) fn check_saturation(plant: &PlantParameters, limit: f64) -> Result<()
 #[cfg(test)]
 mod tests {
     use super::*;
+    use drive_control::estimator::Kind;
     use drive_plant::flux_map;
     use drive_plant::saturation::Saturation;
 
@@ -98,6 +107,11 @@ mod tests {
     #[test]
     fn no_flux_linkage_beyond_the_last_current() {
         let motor = Motor { L_d: 6e-3, L_q: 6e-3, ..Motor::default() };
+        let controller = |i| {
+            let mut controller = ControllerParameters { estimator: Kind::DirectEmf, ..Default::default() };
+            controller.limit.i = i;
+            controller
+        };
         let plant = |s_2| PlantParameters {
             motor: motor.clone(),
             saturation: Saturation { s_2, ..Saturation::default() },
@@ -109,14 +123,22 @@ mod tests {
             let psi = linkage(&motor, plant.magnetics(), i, (0.0, 0.0));
             assert_eq!(psi.d().is_finite(), exists, "{share}: {psi:?}");
             assert!(!exists || (machine::current(&motor, plant.magnetics(), psi) - i).magnitude() < 1e-10);
-            assert_eq!(check_saturation(&plant, share * last).is_ok(), exists, "{share}");
+            assert_eq!(check_saturation(&plant, &controller(share * last)).is_ok(), exists, "{share}");
         }
-        let refused = check_saturation(&plant(1000.0), 10.0).unwrap_err().to_string();
+        let refused = check_saturation(&plant(1000.0), &controller(10.0)).unwrap_err().to_string();
         assert!(
             refused.starts_with("saturation.s_2 = 1000") && refused.contains("controller.limit.i = 10 A"),
             "{refused}"
         );
-        assert_eq!(check_saturation(&plant(-1000.0), 10.0), Ok(()), "saturates with more negative current");
+        assert_eq!(
+            check_saturation(&plant(-1000.0), &controller(10.0)),
+            Ok(()),
+            "saturates with more negative current"
+        );
+        // The low-speed law magnetizes the d-axis.
+        let flux_observer = ControllerParameters { estimator: Kind::Rasmussen, ..controller(10.0) };
+        let refused = check_saturation(&plant(-10_000.0), &flux_observer).unwrap_err().to_string();
+        assert!(refused.contains("up to controller.zero_speed.i_0 = "), "{refused}");
     }
 
     #[test]
