@@ -315,6 +315,22 @@ fn arrays_have_the_sizes_that_were_set() {
     }
 }
 
+/// A type that the model does not have is refused where there is a value.
+#[test]
+fn an_empty_array_has_no_value_of_a_wrong_type() {
+    for (k, status) in [(0, OK), (1, ERROR)] {
+        let number = usize::try_from(k).unwrap();
+        let sized = || {
+            let it = It::new(false);
+            assert_eq!((it.enter(), it.set_sizes(&[N, K], &[1, k]), it.exit()), (OK, OK, OK));
+            it
+        };
+        let mut flag = Fmi3Boolean(0);
+        assert_eq!(unsafe { fmi3GetBoolean(sized().0, &GAINS, 1, &mut flag, number) }, status, "{k}");
+        assert_eq!(unsafe { fmi3SetBoolean(sized().0, &GAINS, 1, &flag, number) }, status, "{k}");
+    }
+}
+
 /// A size above its bound is refused before memory is allocated, except for the message.
 #[test]
 fn sizes_are_judged() {
