@@ -185,6 +185,12 @@ fn pass_one<E: Exported, F: Function>(
     if !handle.take(FREE) {
         return unusual();
     }
+    pass_taken::<E, F>(handle, body) as c_int
+}
+
+/// Passes a call to the instance, which this call has taken, and gives it back.
+#[inline]
+fn pass_taken<E: Exported, F: Function>(handle: &Handle<E>, body: impl FnOnce(Abi<'_, E>) -> Answer) -> Status {
     // SAFETY: it was free, so no other call of this thread holds the instance, and no other thread uses it.
     let instance = unsafe { &mut *handle.instance.get() };
     let status =
@@ -195,7 +201,7 @@ fn pass_one<E: Exported, F: Function>(
             pass(const { &F::ENTRY }, instance, body)
         };
     handle.give();
-    status as c_int
+    status
 }
 
 /// Whether a call of the model can call the importer, which may call the instance again.
@@ -212,7 +218,7 @@ const fn calls_back<E: Exported>() -> bool {
 pub(crate) unsafe fn enter_parts<E: Exported, F: Function>(
     pointer: *mut c_void,
     mut part: impl FnMut(Abi<'_, E>, Reply) -> Result<Option<Request>, Refusal>,
-    unusual: impl Fn() -> c_int,
+    unusual: impl FnOnce() -> c_int,
 ) -> c_int {
     if pointer.is_null() {
         return Status::Error as c_int;
@@ -220,6 +226,9 @@ pub(crate) unsafe fn enter_parts<E: Exported, F: Function>(
     // SAFETY: the caller's promise; the instance lives on, because `close` does not free an instance during a callback.
     let handle = unsafe { &*pointer.cast::<Handle<E>>() };
     let _lock = if const { locks::<E, F>() } { handle.lock() } else { None };
+    if !handle.take(FREE) {
+        return unusual();
+    }
     let mut reply = None;
     loop {
         let mut request = None;
@@ -230,8 +239,8 @@ pub(crate) unsafe fn enter_parts<E: Exported, F: Function>(
             }
             Ok(())
         };
-        let status = pass_one::<E, F>(handle, pass, &unusual);
-        let Some(request) = request else { return status };
+        let status = pass_taken::<E, F>(handle, pass);
+        let Some(request) = request else { return status as c_int };
         handle.calling.store(true, Relaxed);
         if const { E::CAN.scheduled } {
             let outer = CALLING.replace(handle.address());
@@ -247,12 +256,10 @@ pub(crate) unsafe fn enter_parts<E: Exported, F: Function>(
         }
         // SAFETY: no call had it, as in `pass_one`.
         let instance = unsafe { &mut *handle.instance.get() };
-        let waited = instance.current.life.called_back();
-        if !waited {
+        // The next part follows at once: between the two, a call of another thread would make this one fail.
+        if !instance.current.life.called_back() {
             instance.log.error(&format!("{}: a call of the callback failed", F::ENTRY.name));
-        }
-        handle.give();
-        if !waited {
+            handle.give();
             return Status::Error as c_int;
         }
     }
