@@ -1,0 +1,96 @@
+//! An array of states whose length never changes: in FMI 3.0, the array of its derivatives has as many values.
+#![allow(missing_docs, clippy::float_cmp)]
+#![allow(
+    clippy::undocumented_unsafe_blocks,
+    clippy::borrow_as_ptr,
+    reason = "an importer calls C functions, rightly or not"
+)]
+
+use fmi::*;
+use fmu_core::unit::{ONE, PER_SECOND};
+use fmu_core::{
+    Block, ContinuousTime, Elapsed, Exported, Fault, Info, Model, Row, State, Step, Table, integrate, table,
+};
+use fmu_export::abi::types::*;
+use serde::{Deserialize, Serialize};
+use std::ffi::CString;
+use std::ptr::{null, null_mut};
+
+/// Three decays, each with its rate in 1/s.
+#[derive(Clone, Serialize, Deserialize)]
+struct Decays {
+    rates: Vec<f64>,
+    x: Vec<f64>,
+}
+
+impl Default for Decays {
+    fn default() -> Self {
+        Self { rates: vec![1.0, 2.0, 4.0], x: vec![8.0; 3] }
+    }
+}
+
+#[derive(Clone, Default, Serialize, Deserialize)]
+struct Outputs {}
+
+type V = Row<Block<Decays>>;
+
+impl Model for Decays {
+    type Outputs = Outputs;
+    const INFO: Info = Info { name: "Decays", ..Info::DEFAULT };
+    const TABLE: &'static Table<Block<Self>> = table![
+        V::array_parameter("rates", &PER_SECOND, "Rates", 3, |m| &mut m.model.rates),
+        V::array_local("x", &ONE, "States", 3, |m| &mut m.model.x),
+    ];
+    fn initialize(&mut self) {
+        self.x = vec![8.0; 3];
+    }
+    fn output(&self, _: Elapsed, _: &mut Outputs) {}
+    fn advance(&mut self, step: &Step) -> Result<(), Fault> {
+        integrate::smooth::<Self, 3>(self, step, 0.01)
+    }
+}
+
+impl ContinuousTime for Decays {
+    const STATES: &'static [State<Self>] = &[State::array("x", &PER_SECOND, 3, |m| &mut m.x)];
+    fn derivatives(&self, _: Elapsed, dx: &mut [f64]) -> Result<(), Fault> {
+        for ((dx, x), rate) in dx.iter_mut().zip(&self.x).zip(&self.rates) {
+            *dx = -rate * x;
+        }
+        Ok(())
+    }
+}
+
+fmu_export::export!(Decays: ContinuousTime);
+
+const X: u32 = 4;
+const DER_X: u32 = 7;
+const OK: c_int = 0;
+const ERROR: c_int = 3;
+
+/// An instance for Model Exchange, initialized.
+fn started() -> InstancePointer {
+    let (token, no) = (CString::new(This::TOKEN.as_str()).unwrap(), Fmi3Boolean(0));
+    unsafe {
+        let it = fmi3InstantiateModelExchange(c"it".as_ptr(), token.as_ptr(), null(), no, no, null_mut(), None);
+        assert_eq!(fmi3EnterInitializationMode(it, no, 0.0, 0.0, no, 0.0), OK);
+        assert_eq!(fmi3ExitInitializationMode(it), OK);
+        it
+    }
+}
+
+fn get(it: InstancePointer, references: &[u32], n: usize) -> (c_int, Vec<f64>) {
+    let mut values = vec![0.0; n];
+    (unsafe { fmi3GetFloat64(it, references.as_ptr(), references.len(), values.as_mut_ptr(), n) }, values)
+}
+
+#[test]
+fn derivatives_have_the_length_of_their_states() {
+    let it = started();
+    assert_eq!(get(it, &[X, DER_X], 6), (OK, vec![8.0, 8.0, 8.0, -8.0, -16.0, -32.0]));
+    unsafe { fmi3FreeInstance(it) };
+    for (references, n) in [(&[DER_X][..], 1), (&[DER_X], 2), (&[DER_X], 4), (&[DER_X + 1], 1), (&[X + 1], 1)] {
+        let it = started();
+        assert_eq!(get(it, references, n).0, ERROR, "{references:?}: {n} values");
+        unsafe { fmi3FreeInstance(it) };
+    }
+}
