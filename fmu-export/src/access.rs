@@ -430,8 +430,7 @@ impl<E: Exported> Instance<E> {
         if let Some((_, n)) = table::<E>().extent(&mut self.current.block, index) {
             return Ok(n);
         }
-        let number = self.after_table(index).filter(|number| *number < E::CAN.scalars());
-        match number.and_then(|number| Some((number, E::CAN.state_of(number)?))) {
+        match self.after_table(index).and_then(|number| Some((number, E::CAN.state_of(number)?))) {
             Some((number, (state, first))) if number > first => {
                 Err(message::inner_derivative(Self::reference_of(number), state.name, Self::reference_of(first)))
             }

@@ -88,7 +88,17 @@ fn derivatives_have_the_length_of_their_states() {
     let it = started();
     assert_eq!(get(it, &[X, DER_X], 6), (OK, vec![8.0, 8.0, 8.0, -8.0, -16.0, -32.0]));
     unsafe { fmi3FreeInstance(it) };
-    for (references, n) in [(&[DER_X][..], 1), (&[DER_X], 2), (&[DER_X], 4), (&[DER_X + 1], 1), (&[X + 1], 1)] {
+    let inner = [DER_X + 1, X + 1].map(|inner| [inner]);
+    let cases = [
+        (&[DER_X][..], 1),
+        (&[DER_X], 2),
+        (&[DER_X], 4),
+        (&inner[0], 1),
+        (&inner[0], 3),
+        (&inner[1], 1),
+        (&inner[1], 3),
+    ];
+    for (references, n) in cases {
         let it = started();
         assert_eq!(get(it, references, n).0, ERROR, "{references:?}: {n} values");
         unsafe { fmi3FreeInstance(it) };
