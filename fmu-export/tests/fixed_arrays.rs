@@ -16,16 +16,17 @@ use serde::{Deserialize, Serialize};
 use std::ffi::CString;
 use std::ptr::{null, null_mut};
 
-/// Three decays, each with its rate in 1/s.
+/// Three decays, each with its rate in 1/s, and one of 1/s.
 #[derive(Clone, Serialize, Deserialize)]
 struct Decays {
     rates: Vec<f64>,
     x: Vec<f64>,
+    z: f64,
 }
 
 impl Default for Decays {
     fn default() -> Self {
-        Self { rates: vec![1.0, 2.0, 4.0], x: vec![8.0; 3] }
+        Self { rates: vec![1.0, 2.0, 4.0], x: vec![8.0; 3], z: 5.0 }
     }
 }
 
@@ -40,22 +41,25 @@ impl Model for Decays {
     const TABLE: &'static Table<Block<Self>> = table![
         V::array_parameter("rates", &PER_SECOND, "Rates", 3, |m| &mut m.model.rates),
         V::array_local("x", &ONE, "States", 3, |m| &mut m.model.x),
+        V::state("z", &ONE, "One more state", |m| &mut m.model.z),
     ];
     fn initialize(&mut self) {
-        self.x = vec![8.0; 3];
+        *self = Self { rates: self.rates.clone(), ..Self::default() };
     }
     fn output(&self, _: Elapsed, _: &mut Outputs) {}
     fn advance(&mut self, step: &Step) -> Result<(), Fault> {
-        integrate::smooth::<Self, 3>(self, step, 0.01)
+        integrate::smooth::<Self, 4>(self, step, 0.01)
     }
 }
 
 impl ContinuousTime for Decays {
-    const STATES: &'static [State<Self>] = &[State::array("x", &PER_SECOND, 3, |m| &mut m.x)];
+    const STATES: &'static [State<Self>] =
+        &[State::array("x", &PER_SECOND, 3, |m| &mut m.x), State::new("z", &PER_SECOND, |m| &mut m.z)];
     fn derivatives(&self, _: Elapsed, dx: &mut [f64]) -> Result<(), Fault> {
         for ((dx, x), rate) in dx.iter_mut().zip(&self.x).zip(&self.rates) {
             *dx = -rate * x;
         }
+        dx[3] = -self.z;
         Ok(())
     }
 }
@@ -63,7 +67,7 @@ impl ContinuousTime for Decays {
 fmu_export::export!(Decays: ContinuousTime);
 
 const X: u32 = 4;
-const DER_X: u32 = 7;
+const DER_X: u32 = 8;
 const OK: c_int = 0;
 const ERROR: c_int = 3;
 
