@@ -13,7 +13,8 @@ use fmu_core::{
 };
 use fmu_export::abi::types::*;
 use serde::{Deserialize, Serialize};
-use std::ffi::CString;
+use std::cell::RefCell;
+use std::ffi::{CStr, CString};
 use std::ptr::{null, null_mut};
 
 /// Three decays, each with its rate in 1/s, and one of 1/s.
@@ -71,11 +72,19 @@ const DER_X: u32 = 8;
 const OK: c_int = 0;
 const ERROR: c_int = 3;
 
+thread_local! {
+    static SAID: RefCell<String> = const { RefCell::new(String::new()) };
+}
+
+extern "C" fn log(_: *mut c_void, _: c_int, _: Text, message: Text) {
+    SAID.set(unsafe { CStr::from_ptr(message) }.to_str().unwrap().to_owned());
+}
+
 /// An instance for Model Exchange, initialized.
 fn started() -> InstancePointer {
     let (token, no) = (CString::new(This::TOKEN.as_str()).unwrap(), Fmi3Boolean(0));
     unsafe {
-        let it = fmi3InstantiateModelExchange(c"it".as_ptr(), token.as_ptr(), null(), no, no, null_mut(), None);
+        let it = fmi3InstantiateModelExchange(c"it".as_ptr(), token.as_ptr(), null(), no, no, null_mut(), Some(log));
         assert_eq!(fmi3EnterInitializationMode(it, no, 0.0, 0.0, no, 0.0), OK);
         assert_eq!(fmi3ExitInitializationMode(it), OK);
         it
@@ -107,4 +116,9 @@ fn derivatives_have_the_length_of_their_states() {
         assert_eq!(get(it, references, n).0, ERROR, "{references:?}: {n} values");
         unsafe { fmi3FreeInstance(it) };
     }
+    let it = started();
+    assert_eq!(get(it, &[DER_X + 2], 1).0, ERROR);
+    unsafe { fmi3FreeInstance(it) };
+    let why = "value reference 10 does not exist; it belongs to the array der(x) with reference 8";
+    assert_eq!(SAID.take(), format!("fmi3GetFloat64: {why}"));
 }
