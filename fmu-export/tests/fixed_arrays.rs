@@ -98,6 +98,9 @@ fn get(it: InstancePointer, references: &[u32], n: usize) -> (c_int, Vec<f64>) {
 
 #[test]
 fn derivatives_have_the_length_of_their_states() {
+    // The library silences panics; a test needs its own.
+    fmu_export::abi::quiet();
+    drop(std::panic::take_hook());
     let it = started();
     assert_eq!(get(it, &[X, DER_X], 6), (OK, vec![8.0, 8.0, 8.0, -8.0, -16.0, -32.0]));
     unsafe { fmi3FreeInstance(it) };
@@ -121,4 +124,8 @@ fn derivatives_have_the_length_of_their_states() {
     unsafe { fmi3FreeInstance(it) };
     let why = "value reference 10 does not exist; it belongs to the array der(x) with reference 8";
     assert_eq!(SAID.take(), format!("fmi3GetFloat64: {why}"));
+    let it = started();
+    assert_eq!(unsafe { fmi3SetFloat64(it, &DER_X, 1, [1.0; 3].as_ptr(), 3) }, ERROR);
+    unsafe { fmi3FreeInstance(it) };
+    assert_eq!(SAID.take(), "fmi3SetFloat64: der(x) is calculated and cannot be set");
 }
