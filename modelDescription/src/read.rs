@@ -11,7 +11,7 @@ mod terminals;
 mod types;
 mod variables;
 
-use crate::description::{Experiment, Interface, LogCategory, ModelDescription};
+use crate::description::{Experiment, Interface, LogCategory, ModelDescription, Names};
 use crate::error::Error;
 use crate::version::FmiVersion;
 use crate::xml::{Element, parse};
@@ -71,6 +71,7 @@ pub fn read_element(root: &Element) -> Result<ModelDescription, Error> {
             FmiVersion::V2 => Vec::new(),
             FmiVersion::V3 => structure::unknowns(structure, version, "", "EventIndicator")?,
         },
+        names: Names::default(),
     })
 }
 

@@ -3,6 +3,7 @@
 mod heading;
 
 pub use heading::Heading;
+use std::collections::BTreeSet;
 use std::io::{self, Write};
 
 /// A table: headings, and rows with as many cells.
@@ -96,7 +97,8 @@ fn refuse(cells: &[String]) -> Result<(), String> {
     if cells.len() > 1 && cells.last().is_some_and(String::is_empty) {
         return Err("ends with a comma, which begins a column without a name: remove it, in every line".into());
     }
-    if let Some(k) = (0..cells.len()).find(|&k| cells[k].is_empty() || cells[..k].contains(&cells[k])) {
+    let mut names = BTreeSet::new();
+    if let Some(k) = cells.iter().position(|name| name.is_empty() || !names.insert(name)) {
         let expected = "expected a name that no other column has";
         return Err(format!("column {} has the name {:?}, {expected}", k + 1, cells[k]));
     }

@@ -91,16 +91,18 @@ impl System {
     /// Several FMUs have the output.
     pub fn connect_by_name(&mut self) -> Result<Vec<(String, String)>, Error> {
         let mut found = Vec::new();
-        let names = |i: &Instance, causality| -> Vec<String> {
-            i.description().variables.iter().filter(|v| v.causality == causality).map(|v| v.name.clone()).collect()
-        };
         for (index, target) in self.instances.iter().enumerate() {
-            for input in names(target, Causality::Input) {
-                if self.wiring.feeds(index, &input) {
+            let inputs = target.description().variables.iter().filter(|v| v.causality == Causality::Input);
+            for input in inputs.map(|v| &v.name) {
+                if self.wiring.feeds(index, input) {
                     continue;
                 }
+                let has = |other: &Instance| {
+                    let found = other.description().variable(input);
+                    found.is_some_and(|v| v.causality == Causality::Output && v.name == *input)
+                };
                 let others = self.instances.iter().enumerate().filter(|(i, _)| *i != index).map(|(_, other)| other);
-                let sources: Vec<_> = others.filter(|o| names(o, Causality::Output).contains(&input)).collect();
+                let sources: Vec<_> = others.filter(|other| has(other)).collect();
                 let to = format!("{}.{input}", target.name());
                 match sources.as_slice() {
                     [] => {}

@@ -8,6 +8,7 @@ use super::wiring::{Change, Feed, Record, Source, Wiring, converted};
 use super::{Schedule, loops};
 use fmu_import::{Error, Instance, Kind, Number, Values};
 use model_description::{BaseType, Conversion};
+use std::collections::BTreeMap;
 
 /// Location of a value during the run.
 #[derive(Clone)]
@@ -103,23 +104,33 @@ impl Exchange {
         texts: impl Iterator<Item = &'a Port>,
     ) -> Self {
         let mut traffic: Vec<Traffic> = (0..instances).map(|_| Traffic::default()).collect();
-        let fed = |port: &Port| wiring.feeds.iter().find(|feed| feed.target == *port).map(|feed| &feed.source);
+        let key = |port: &Port| (port.instance, port.name.clone());
+        let mut fed = BTreeMap::new();
+        for feed in &wiring.feeds {
+            fed.entry(key(&feed.target)).or_insert(&feed.source);
+        }
         // A fed input need not be read: its value is known here, unless its source may have none yet.
-        let origin = |record: &Record| match fed(&record.port) {
+        let origin = |record: &Record| match fed.get(&key(&record.port)).copied() {
             Some(source) if !source.may_lack() && record.change.is_none() => source.clone(),
             _ => Source::Port(record.port.clone(), record.change.clone()),
         };
         let origins: Vec<Source> = records.iter().map(origin).collect();
         let sources = wiring.feeds.iter().map(|feed| &feed.source).chain(&origins);
+        // The slots in `read` and in `read_singly`.
+        let (mut fast, mut single) = (BTreeMap::new(), BTreeMap::new());
         for (index, source) in sources.enumerate() {
             let Source::Port(port, _) = source else { continue };
             let traffic = &mut traffic[port.instance];
-            if !port.is_fast() {
-                if !traffic.read_singly.contains(port) {
+            if port.is_fast() {
+                fast.entry((port.instance, port.reference)).or_insert_with(|| {
+                    traffic.read.push(port.reference);
+                    traffic.read.len() - 1
+                });
+            } else {
+                single.entry(key(port)).or_insert_with(|| {
                     traffic.read_singly.push(port.clone());
-                }
-            } else if !traffic.read.contains(&port.reference) {
-                traffic.read.push(port.reference);
+                    traffic.read_singly.len() - 1
+                });
             }
             if index < wiring.feeds.len() {
                 traffic.feeding = [traffic.read.len(), traffic.read_singly.len()];
@@ -128,28 +139,26 @@ impl Exchange {
         for port in texts.filter(|port| !port.clocks.is_empty()) {
             traffic[port.instance].read_singly.push(port.clone());
         }
-        let place = |traffic: &[Traffic], source: &Source| match source {
+        let place = |source: &Source| match source {
             Source::Port(port, conversion) => {
-                let (instance, of) = (port.instance, &traffic[port.instance]);
-                let fast = || of.read.iter().position(|reference| *reference == port.reference);
-                let single = || of.read_singly.iter().position(|p| p == port);
+                let instance = port.instance;
                 if port.is_fast() {
                     // A table is not for real numbers.
                     let linear = |change: &Change| if let Change::Linear(x) = change { Some(*x) } else { None };
                     let conversion = conversion.as_ref().and_then(linear);
-                    Place::Fast { instance, slot: fast().unwrap_or_default(), conversion }
+                    Place::Fast { instance, slot: fast[&(instance, port.reference)], conversion }
                 } else {
-                    Place::Single { instance, slot: single().unwrap_or_default(), change: conversion.clone() }
+                    Place::Single { instance, slot: single[&key(port)], change: conversion.clone() }
                 }
             }
             Source::Schedule(schedule) => Place::Schedule(schedule.clone()),
         };
         let base = |record: &Record| record.change.is_none().then_some(record.port.base);
-        let row = origins.iter().zip(records).map(|(source, record)| (place(&traffic, source), base(record))).collect();
+        let row = origins.iter().zip(records).map(|(source, record)| (place(source), base(record))).collect();
         let (continuous, mut discrete): (Vec<_>, Vec<_>) = wiring.feeds.iter().partition(|feed| feed.continuous);
         discrete.sort_by_key(|feed| feed.target.base == BaseType::Clock);
         for Feed { target, source, continuous } in continuous.into_iter().chain(discrete) {
-            let place = place(&traffic, source);
+            let place = place(source);
             let traffic = &mut traffic[target.instance];
             let fast = target.is_fast() && !source.may_lack();
             if fast {

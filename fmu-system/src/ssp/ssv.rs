@@ -2,6 +2,7 @@
 
 use super::element::{Definitions, TYPES, local};
 use model_description::{BaseUnit, Element};
+use std::collections::BTreeSet;
 
 /// A value of a file.
 #[derive(Clone, Debug, PartialEq)]
@@ -50,7 +51,7 @@ pub fn parameters(root: &Element) -> Result<Vec<Parameter>, String> {
     }
     let defined = Definitions::read(root)?;
     let sets = root.children.iter().filter(|c| local(c) == "Parameters");
-    let mut all: Vec<Parameter> = Vec::new();
+    let (mut all, mut names) = (Vec::new(), BTreeSet::new());
     for parameter in sets.flat_map(|set| &set.children).filter(|c| local(c) == "Parameter") {
         let at = |what: &str| format!("line {}: {what}", parameter.line);
         let name = parameter.get("name").ok_or_else(|| at("a parameter without a name"))?;
@@ -60,7 +61,7 @@ pub fn parameters(root: &Element) -> Result<Vec<Parameter>, String> {
             .and_then(|typed| value(typed, is_array))
             .ok_or_else(|| at(&format!("{name} has no value, or two")))?;
         let unit = typed.and_then(|typed| defined.unit(typed));
-        if all.iter().any(|other| other.name == name) {
+        if !names.insert(name) {
             return Err(at(&format!("{name} already has a value: remove one of them")));
         }
         let (unit, base) = unit.map_or((None, None), |unit| (Some(unit.name), unit.base));
