@@ -262,3 +262,42 @@ fn a_state_needs_a_continuous_row() {
     let fault = Description::exported::<Nameless>().unwrap_err();
     assert_eq!(fault.message(), "the state n has no continuous real output or state in the table");
 }
+
+/// A model with one event indicator, by its name.
+#[derive(Clone, Default, Serialize, Deserialize)]
+struct Indicated<const LOW: bool>;
+
+impl<const LOW: bool> Model for Indicated<LOW> {
+    type Outputs = ();
+    const INFO: Info = Info { name: "Indicated", ..Info::DEFAULT };
+    const TABLE: &'static Table<Block<Self>> = table![Row::constant("k", &ONE, "", 1.0)];
+    fn initialize(&mut self) {}
+    fn output(&self, _: Elapsed, (): &mut ()) {}
+    fn advance(&mut self, _: &Step) -> Result<(), Fault> {
+        Ok(())
+    }
+}
+
+impl<const LOW: bool> ContinuousTime for Indicated<LOW> {
+    const STATES: &'static [State<Self>] = &[];
+    fn derivatives(&self, _: Elapsed, _: &mut [f64]) -> Result<(), Fault> {
+        Ok(())
+    }
+}
+
+impl<const LOW: bool> Events for Indicated<LOW> {
+    const INDICATORS: &'static [Indicator] = &[Indicator { name: if LOW { "low" } else { "high" }, description: "" }];
+    fn event(&mut self, _: Elapsed) -> Result<Outcome, Fault> {
+        Ok(Outcome::default())
+    }
+    fn next(&self, _: Elapsed) -> Next {
+        Next::Never
+    }
+}
+
+#[test]
+fn another_indicator_is_another_token() {
+    let low = Capabilities::<Indicated<true>>::NONE.ContinuousTime().Events().hash().guid();
+    let high = Capabilities::<Indicated<false>>::NONE.ContinuousTime().Events().hash().guid();
+    assert_ne!(low.as_str(), high.as_str());
+}

@@ -187,6 +187,9 @@ fn every_changed_byte_and_every_other_length_is_noticed() {
     for _ in 0..300 {
         longer.push(0);
         refused(&longer, "longer");
+        let mut sealed = longer.clone();
+        seal(&mut sealed);
+        refused(&sealed, "longer, with a checksum that fits");
     }
     let mut state = null_mut();
     assert_eq!(fmu.deserialize(&bytes, &mut state), OK);
