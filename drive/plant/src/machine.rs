@@ -33,6 +33,8 @@ pub enum Magnetics<'a> {
 
 impl Magnetics<'_> {
     /// Warns of a flux linkage `psi` (Wb) beyond the map, or one at which the polynomial describes no machine.
+    #[cold]
+    #[inline(never)]
     pub fn warn(self, motor: &Motor, psi: Dq, log: &mut Warnings<'_>) {
         let (d, q) = (psi.d(), psi.q());
         match self {
