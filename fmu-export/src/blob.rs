@@ -145,14 +145,15 @@ fn crc32(bytes: &[u8]) -> u32 {
 
 /// The change of the CRC-32 by each byte.
 static BY_BYTE: [u32; 256] = {
-    let (mut table, mut i) = ([0; 256], 0);
-    while i < 256 {
-        let (mut crc, mut bit) = (i as u32, 0);
+    let (mut table, mut byte) = ([0; 256], 0_u32);
+    while byte < 256 {
+        let (mut crc, mut bit) = (byte, 0);
         while bit < 8 {
             crc = if crc & 1 == 1 { (crc >> 1) ^ 0xedb8_8320 } else { crc >> 1 };
             bit += 1;
         }
-        (table[i], i) = (crc, i + 1);
+        table[byte as usize] = crc;
+        byte += 1;
     }
     table
 };

@@ -147,7 +147,7 @@ fn many_names() {
     let (before, after) = THREE.split_once("<ModelVariables>").unwrap();
     let variable = |i: u32| format!("<Float64 name='part.x[{i}]' valueReference='{}'/>", i + 10);
     let many: String = (0..100_000).map(variable).collect();
-    let md = read(&format!("{before}<ModelVariables>{many}{after}")).unwrap();
+    let md = read(format!("{before}<ModelVariables>{many}{after}")).unwrap();
     let start = Instant::now();
     for v in &md.variables {
         assert_eq!(md.variable(&v.name).map(|found| found.value_reference), Some(v.value_reference));
