@@ -1,4 +1,4 @@
-//! A machine that magnetizes beyond its saturation or its flux map: warnings and errors of all models instead of wrong currents.
+//! Flux linkages beyond the saturation polynomial or the flux map: every model warns or returns an error.
 #![allow(missing_docs)]
 
 use drive::plant::flux_map;
@@ -10,8 +10,8 @@ use fmu_core::{Block, Elapsed, Model, Step, Warns};
 /// Speed in rad/s at which the short-circuit current almost cancels the flux linkage of the magnet.
 const FAST: f64 = 300.0;
 
-/// Warnings of a model that is short-circuited at this speed, and the error that ends the run.
-fn said<M: Model + Warns>(block: &mut Block<M>, h: f64, shaft: fn(&mut M) -> [&mut f64; 2]) -> Vec<String> {
+/// The messages about flux of a model that is short-circuited at this speed: its warnings, and the error that ends the run.
+fn reports<M: Model + Warns>(block: &mut Block<M>, h: f64, shaft: fn(&mut M) -> [&mut f64; 2]) -> Vec<String> {
     *shaft(&mut block.model)[0] = FAST;
     block.initialize();
     let (mut now, mut said) = (Elapsed::ZERO, Vec::new());
@@ -35,7 +35,7 @@ fn drive(set: impl Fn(&mut PlantParameters)) -> Vec<String> {
     plant.mechanics.imposed = true;
     set(plant);
     drive.model.inputs.asc = true;
-    said(&mut drive, 1e-4, |model| [&mut model.inputs.speed_shaft, &mut model.inputs.angle_shaft])
+    reports(&mut drive, 1e-4, |model| [&mut model.inputs.speed_shaft, &mut model.inputs.angle_shaft])
 }
 
 fn mean(set: impl Fn(&mut PlantParameters)) -> Vec<String> {
@@ -44,11 +44,11 @@ fn mean(set: impl Fn(&mut PlantParameters)) -> Vec<String> {
     plant.mechanics.imposed = true;
     set(plant);
     mean.model.inputs.asc = true;
-    said(&mut mean, 1e-2, |model| [&mut model.inputs.speed_shaft, &mut model.inputs.angle_shaft])
+    reports(&mut mean, 1e-2, |model| [&mut model.inputs.speed_shaft, &mut model.inputs.angle_shaft])
 }
 
 #[test]
-fn a_short_circuit_beyond_the_saturation_is_told() {
+fn a_short_circuit_beyond_the_saturation_warns() {
     for s_2 in [-400.0, 0.0, 40.0] {
         let set = |plant: &mut PlantParameters| plant.saturation.s_2 = s_2;
         assert_eq!((drive(set), mean(set)), (vec![], vec![]), "{s_2}");
@@ -57,11 +57,11 @@ fn a_short_circuit_beyond_the_saturation_is_told() {
     let beyond = |plant: &mut PlantParameters| plant.saturation.s_2 = 600.0;
     let said = [drive(beyond), mean(beyond)];
     assert!(said[0].len() == 1 && said[0][0].contains("describes no machine"), "{said:?}");
-    assert!(said[1].iter().any(|text| text.contains("no flux linkage has the current of this speed")), "{said:?}");
+    assert!(said[1].iter().any(|text| text.contains("no flux linkage gives the current at this speed")), "{said:?}");
 }
 
 #[test]
-fn a_short_circuit_beyond_the_flux_map_is_told() {
+fn a_short_circuit_beyond_the_flux_map_warns() {
     let map = |d_min| {
         move |plant: &mut PlantParameters| {
             plant.flux_map = flux_map::linear(&plant.motor, [d_min, 0.1], 0.3);

@@ -1,4 +1,4 @@
-//! Rows, tables, states and members that a program builds while it runs: what they say, and what they hold.
+//! Rows, tables, states and members that are built at run time: their properties and values.
 #![allow(missing_docs, clippy::float_cmp)]
 
 use fmu_core::bytes::Bytes;
@@ -38,8 +38,8 @@ fn of<const N: usize>(rows: [Row<Whole>; N]) -> Table<Whole> {
     Table::new(Box::leak(Box::new(numbered(rows))))
 }
 
-/// What a variable is, and its value.
-fn told(table: &Table<Whole>, index: usize) -> (&'static str, Causality, Variability, String) {
+/// Name, causality, variability and value of a variable.
+fn properties(table: &Table<Whole>, index: usize) -> (&'static str, Causality, Variability, String) {
     let mut whole = Whole { motor: Motor { u: 1.5, ..Motor::default() } };
     let (meta, slot) = table.entry(&mut whole, index).unwrap();
     (meta.name, meta.causality, meta.variability, slot.to_string())
@@ -58,7 +58,7 @@ fn constants_hold_their_values() {
     ]);
     let values = ["0.1", "0.1", "true", "\"said\"", "5", "18446744073709551615", "1", "-2"];
     for (index, value) in values.into_iter().enumerate() {
-        let (name, causality, variability, found) = told(&table, index);
+        let (name, causality, variability, found) = properties(&table, index);
         assert_eq!((causality, variability), (Causality::Local, Variability::Constant), "{name}");
         assert_eq!(found, value, "{name}");
     }
@@ -75,8 +75,8 @@ fn a_part_keeps_its_rows_and_what_is_computed_is_read() {
     let table = of([Row::part("motor.", &PART), Row::computed_output("y", &VOLT, "", |m| 2.0 * m.motor.u)]);
     assert_eq!((table.len(), table.is_empty(), of::<0>([]).is_empty()), (3, false, true));
     assert_eq!(table.locate(0).unwrap().0, "motor.u");
-    assert_eq!(told(&table, 0), ("u", Causality::Input, Variability::Discrete, "1.5".to_owned()));
-    assert_eq!(told(&table, 2), ("y", Causality::Output, Variability::Discrete, "3".to_owned()));
+    assert_eq!(properties(&table, 0), ("u", Causality::Input, Variability::Discrete, "1.5".to_owned()));
+    assert_eq!(properties(&table, 2), ("y", Causality::Output, Variability::Discrete, "3".to_owned()));
     let mut whole = Whole::default();
     let Some((_, Slot::Boolean(sample))) = table.entry(&mut whole, 1) else { panic!("motor.sample is no truth value") };
     *sample = true;

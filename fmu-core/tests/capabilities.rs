@@ -263,7 +263,7 @@ fn a_state_needs_a_continuous_row() {
     assert_eq!(fault.message(), "the state n has no continuous real output or state in the table");
 }
 
-/// A model with one event indicator, by its name.
+/// A model with one event indicator, whose name depends on `LOW`.
 #[derive(Clone, Default, Serialize, Deserialize)]
 struct Indicated<const LOW: bool>;
 

@@ -134,7 +134,7 @@ pub(crate) fn shelf<M: Model>(model: &M, storing: &Storing<M>) -> Shelf {
     Shelf::of(|| drop((storing.size)(model)))
 }
 
-/// CRC-32 of ISO 3309, as in PNG and ZIP, a byte at a time.
+/// CRC-32 of ISO 3309, as in PNG and ZIP, by a table for one byte.
 fn crc32(bytes: &[u8]) -> u32 {
     let mut crc = !0_u32;
     for &byte in bytes {
@@ -143,7 +143,7 @@ fn crc32(bytes: &[u8]) -> u32 {
     !crc
 }
 
-/// The change of the CRC-32 by each byte.
+/// CRC-32 of each byte alone, without the inversions at start and end.
 static BY_BYTE: [u32; 256] = {
     let (mut table, mut byte) = ([0; 256], 0_u32);
     while byte < 256 {

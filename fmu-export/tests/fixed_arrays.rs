@@ -1,4 +1,5 @@
-//! An array of states whose length never changes: in FMI 3.0, the array of its derivatives has as many values.
+//! Arrays of states with a fixed length: in FMI 3.0, the array of derivatives has the same length, and its inner elements have no
+//! reference. The derivative of an output that accumulates.
 #![allow(missing_docs, clippy::float_cmp)]
 #![allow(
     clippy::undocumented_unsafe_blocks,
@@ -17,7 +18,7 @@ use std::cell::RefCell;
 use std::ffi::{CStr, CString};
 use std::ptr::{null, null_mut};
 
-/// Three decays, each with its rate in 1/s, and one of 1/s.
+/// Three decays with their rates in 1/s, and a fourth one with 1/s.
 #[derive(Clone, Serialize, Deserialize)]
 struct Decays {
     rates: Vec<f64>,

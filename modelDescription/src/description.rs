@@ -65,13 +65,13 @@ pub struct ModelDescription {
     pub(crate) names: Names,
 }
 
-/// Places of the variables in the order of their names, from the first search for a name on: a hundred thousand searches in a hundred
-/// thousand variables would take a minute.
+/// Indices of the variables, sorted by name; the first search for a name builds it. A linear search for each of 100,000 names among
+/// as many variables takes a minute.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct Names(OnceLock<Vec<usize>>);
 
 impl PartialEq for Names {
-    /// It follows from the variables.
+    /// The index follows from the variables: it never makes two descriptions differ.
     fn eq(&self, _: &Self) -> bool {
         true
     }

@@ -50,6 +50,7 @@ use drive_control::tables::{self as control, ControllerParameters};
 use drive_control::trip::{Cause, Trip};
 use drive_plant::PmsmPlant;
 use drive_plant::inverter::Gates;
+use drive_plant::machine::Magnetics;
 use drive_plant::power::{Energy, Powers};
 use drive_plant::pwm::Pwm;
 use drive_plant::rules::check_temperatures;
@@ -449,9 +450,10 @@ impl PmsmDriveMean {
     /// Refuses a step of `h` (s) that ends at this `point`.
     #[cold]
     fn diverged(&self, h: f64, point: &Point) -> Fault {
-        let cause = if point.psi.d().is_nan() && !self.drive.plant.is_linear() {
-            ": no flux linkage has the current of this speed; plant.saturation (s_2, s_3, s_dq) describes a machine only up to smaller \
-             currents: use coefficients closer to 0, or plant.flux_map"
+        let saturates = matches!(self.drive.plant.magnetics(), Magnetics::Polynomial(_));
+        let cause = if point.psi.d().is_nan() && saturates {
+            ": no flux linkage gives the current at this speed, because plant.saturation (s_2, s_3, s_dq) describes the machine only up \
+             to smaller currents; use coefficients closer to 0, or plant.flux_map"
         } else {
             ""
         };

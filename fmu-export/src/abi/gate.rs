@@ -256,7 +256,7 @@ pub(crate) unsafe fn enter_parts<E: Exported, F: Function>(
         }
         // SAFETY: no call had it, as in `pass_one`.
         let instance = unsafe { &mut *handle.instance.get() };
-        // The next part follows at once: between the two, a call of another thread would make this one fail.
+        // The next part follows without giving the instance back: a call of another thread in between would make this one fail.
         if !instance.current.life.called_back() {
             instance.log.error(&format!("{}: a call of the callback failed", F::ENTRY.name));
             handle.give();
