@@ -1,11 +1,12 @@
 //! A first run that fails may fail because of a limit of the checker or because of this computer. It is tried again without the
-//! limits on memory and open files, and from another folder if the binary does not load: where it then succeeds, the FMU is not at
+//! limits on address space and open files, and from another folder if the binary does not load: where it then succeeds, the FMU is not at
 //! fault. This also applies if it requests a license.
 
 use crate::check::{Check, Conclusion, Verdict};
 use crate::checks::GROUPS;
 use crate::lines::SAID;
-use crate::runner::{Conditions, OUT_OF_TIME, Runner};
+use crate::runner::{Conditions, OUT_OF_MEMORY, OUT_OF_TIME, Runner};
+use crate::watch::kernel_size;
 use fmu_import::{Folder, limits};
 use std::path::{Path, PathBuf};
 use std::{env, fs, io};
@@ -19,7 +20,7 @@ const NOT_MAPPED: &str = "failed to map segment";
 
 impl Runner {
     /// The findings of a first run, or the reason why the FMU is not at fault.
-    pub(super) fn excused(&self, check: &Check, conditions: &Conditions, found: Conclusion) -> Conclusion {
+    pub(super) fn excused(&self, check: &Check, conditions: &Conditions, mut found: Conclusion) -> Conclusion {
         let why = match &found.verdict {
             Verdict::Violated(evidence) => evidence.join("; "),
             Verdict::NotDetermined(why) => why.clone(),
@@ -29,27 +30,47 @@ impl Runner {
         if why == OUT_OF_TIME || why.contains("did not return") || why.contains("too slow") {
             return found;
         }
-        let excuse = self.unlicensed(&why).or_else(|| self.limited(check, conditions, &why));
+        let excuse = self.unlicensed(&why).or_else(|| self.limited(check, conditions, &why, &mut found));
         let excuse = excuse.or_else(|| why.contains(NOT_MAPPED).then(|| self.elsewhere(conditions, &why)).flatten());
         excuse.map_or(found, |why| Verdict::NotDetermined(why).into())
     }
 
-    /// A limit is the cause if the run succeeds without it.
-    fn limited(&self, check: &Check, conditions: &Conditions, why: &str) -> Option<String> {
+    /// A limit is the cause if the run succeeds without it. If that run takes four times the memory, it is an additional finding.
+    fn limited(&self, check: &Check, conditions: &Conditions, why: &str, found: &mut Conclusion) -> Option<String> {
         let limit = conditions.allowance.memory;
         if limit == 0 {
             return None;
         }
-        let succeeds = |memory: u64| {
+        let (gib, files) = ((limit >> 30).max(1), limits::PROCESS_FILES);
+        let most = 4 * limit;
+        let resident = most.min(free());
+        let run = |memory: u64| {
             let mut other = conditions.clone();
             other.allowance.memory = memory;
-            matches!(self.attempt(check, &other).verdict, Verdict::Pass(_))
+            other.resident = Some(resident);
+            self.attempt(check, &other).verdict
         };
-        if !succeeds(0) {
-            return None;
+        match run(0) {
+            Verdict::Pass(_) => {}
+            Verdict::NotDetermined(end) if end == OUT_OF_MEMORY && resident < most => {
+                return Some(format!(
+                    "with the limit of {gib} GiB of address space, {why}; without it, the run took {} GiB, most of the memory \
+                     that is free on this computer",
+                    resident >> 30
+                ));
+            }
+            Verdict::NotDetermined(end) if end == OUT_OF_MEMORY => {
+                if let Verdict::Violated(evidence) = &mut found.verdict {
+                    evidence.push(format!(
+                        "that run had a limit of {gib} GiB of address space; without it, the run took more than {} GiB of memory",
+                        4 * gib
+                    ));
+                }
+                return None;
+            }
+            _ => return None,
         }
-        let (gib, files) = ((limit >> 30).max(1), limits::PROCESS_FILES);
-        Some(if succeeds(4 * limit) {
+        Some(if matches!(run(most), Verdict::Pass(_)) {
             format!(
                 "with the limit of {gib} GiB of address space, {why}; with more, this run succeeds: use --memory {}",
                 4 * gib
@@ -83,7 +104,7 @@ impl Runner {
         others.into_iter().flatten().filter(|folder| *folder != temporary).find_map(|folder| {
             let copy = tempfile::Builder::new().prefix(Folder::PROBE).tempdir_in(&folder).ok()?;
             let mut moved = conditions.clone();
-            moved.allowance.memory = 0;
+            (moved.allowance.memory, moved.resident) = (0, Some(free()));
             moved.dir = copy.path().into();
             moved.binary = copy_binary(conditions, copy.path()).ok()??;
             let loads = matches!(self.attempt(check, &moved).verdict, Verdict::Pass(_));
@@ -96,6 +117,11 @@ impl Runner {
             })
         })
     }
+}
+
+/// Memory in bytes that a run may take without disturbing the computer: three quarters of what is free.
+fn free() -> u64 {
+    kernel_size("meminfo", "MemAvailable:").map_or(u64::MAX, |bytes| bytes / 4 * 3)
 }
 
 /// Copies the description, and the binary with the files beside it; returns the path of the binary.

@@ -10,7 +10,7 @@ use crate::evidence::{calls, conclude, is_after_free, is_of_second, panic, print
 use crate::fmu_file::FmuFile;
 use crate::lines::Line;
 use crate::probe::NOT_WRITTEN;
-use crate::watch::{Pace, Watch};
+use crate::watch::{Pace, Watch, kernel_size};
 use fmu_import::Folder;
 use fmu_import::guard::{self, Allowance, End, Guarded};
 use fmu_import::limits;
@@ -33,6 +33,7 @@ const INSTANCE_ALONE: [&str; 5] = ["X04", "L01a", "G-L2a", "G-L2b", "G-L3c"];
 /// The check that processes which outlive a probe count for.
 const LEFT_BEHIND: &str = "B08p";
 pub(super) const OUT_OF_TIME: &str = "the run reached its time limit (see --timeout)";
+pub(super) const OUT_OF_MEMORY: &str = "the run reached its limit of resident memory";
 /// File with the description for the probes.
 const DESCRIPTION: &str = "description";
 /// After this time, a clock that counts seconds shows a different value.
@@ -91,6 +92,9 @@ pub(super) struct Conditions {
     pub(super) dir: PathBuf,
     pub(super) binary: PathBuf,
     pub(super) allowance: Allowance,
+    /// The resident memory in bytes at which the checker ends the process: without a limit on address space, an FMU could take
+    /// the memory of the whole computer. Linux only.
+    pub(super) resident: Option<u64>,
 }
 
 /// The checks on which others depend: a failure that is due to this computer or to a limit is not a finding.
@@ -106,6 +110,8 @@ enum Outcome {
     Slow,
     /// The time limit of the whole run was reached.
     OutOfTime,
+    /// [`Conditions::resident`] was reached.
+    OutOfMemory,
 }
 
 impl Runner {
@@ -180,7 +186,7 @@ impl Runner {
         let Some(binary) = binary.as_ref().or_else(other) else {
             return Verdict::NotApplicable(format!("the FMU has no interface for {interface}")).into();
         };
-        let conditions = Conditions { dir: self.dir.clone(), binary: binary.clone(), allowance: self.allowance };
+        let conditions = self.conditions(binary);
         let mut found = self.attempt(check, &conditions);
         if FIRST.contains(&check.id) {
             found = self.excused(check, &conditions, found);
@@ -191,6 +197,10 @@ impl Runner {
             found.script = full.unwrap_or_else(|| found.calls.clone());
         }
         found
+    }
+
+    fn conditions(&self, binary: &Path) -> Conditions {
+        Conditions { dir: self.dir.clone(), binary: binary.into(), allowance: self.allowance, resident: None }
     }
 
     /// The first of two processes that a check compares: no result yet if it passes. The second process, one second of the clock
@@ -317,13 +327,13 @@ impl Runner {
         let folder = Folder::of_probe()?;
         fs::create_dir(folder.path().join("home"))?;
         let out = folder.path().join("out");
-        let conditions = Conditions { dir: self.dir.clone(), binary: binary.into(), allowance: self.allowance };
+        let conditions = self.conditions(binary);
         let mut command = self.command(check, &conditions, folder.path(), case.unwrap_or(0))?;
         command.arg("--trace");
         if case.is_some() {
             command.arg("--one");
         }
-        let end = self.guarded(check, command, &out)?;
+        let end = self.guarded(check, command, &conditions, &out)?;
         let lines = read(&out);
         let (mut crashes, mut slow) = (Vec::new(), None);
         if !lines.iter().any(|l| matches!(l, Line::Done)) {
@@ -341,23 +351,26 @@ impl Runner {
         let console = File::options().create(true).append(true).open(folder.join("console"))?;
         let mut command = self.command(check, conditions, folder, from)?;
         command.stdout(console.try_clone()?).stderr(console);
-        self.guarded(check, command, &folder.join("out"))
+        self.guarded(check, command, conditions, &folder.join("out"))
     }
 
     /// Runs a command of [`Self::command`] to its end.
-    fn guarded(&self, check: &Check, command: Command, out: &Path) -> io::Result<Outcome> {
-        let (mut watch, mut state, mut late) = (None, Pace::Runs, false);
+    fn guarded(&self, check: &Check, command: Command, conditions: &Conditions, out: &Path) -> io::Result<Outcome> {
+        let (mut watch, mut state, mut late, mut large) = (None, Pace::Runs, false, false);
         let new = |id| Watch::new(id, out.with_extension("call"), self.limit(check.id));
         let report = Guarded::start(command)?.wait(|id| {
             late = self.deadline.is_some_and(|end| Instant::now() > end);
             if let Some(id) = id {
                 state = watch.get_or_insert_with(|| new(id)).look();
+                let memory = || kernel_size(&format!("{id}/status"), "VmRSS:");
+                large = conditions.resident.is_some_and(|most| memory().is_some_and(|bytes| bytes > most));
             }
-            late || state != Pace::Runs
+            late || large || state != Pace::Runs
         })?;
         match report.end {
             End::Refused(why) => return Err(io::Error::other(why)),
             End::Stopped if late => return Ok(Outcome::OutOfTime),
+            End::Stopped if large => return Ok(Outcome::OutOfMemory),
             End::Stopped if state == Pace::Slow => return Ok(Outcome::Slow),
             End::Stopped if state == Pace::Stopped => {
                 return Ok(Outcome::Hang("stopped the process (as by SIGSTOP), which was not continued"));
@@ -383,6 +396,7 @@ impl Runner {
         let limit = self.limit(check.id).as_secs_f64();
         match end {
             Outcome::OutOfTime => Err(OUT_OF_TIME.into()),
+            Outcome::OutOfMemory => Err(OUT_OF_MEMORY.into()),
             Outcome::Slow => Err(format!(
                 "the probe is too slow on this machine for a limit of {limit} s per call; it was in {} (see --patience)",
                 call.trim_start_matches(['C', 'P', 'S', 'H']).trim()
@@ -428,7 +442,7 @@ impl Runner {
         let mut command = self.command(check, conditions, folder.path(), 0)?;
         command.arg("--full").stdout(console.try_clone()?).stderr(console);
         let out = folder.path().join("out");
-        self.guarded(check, command, &out)?;
+        self.guarded(check, command, conditions, &out)?;
         Ok(script(&fs::read_to_string(out.with_extension("log"))?))
     }
 

@@ -8,6 +8,7 @@ use crate::instance::Instance;
 use crate::session::{NotDetermined, Session};
 use crate::state::State;
 use crate::trajectory::trajectory;
+use crate::watch::kernel_size;
 use fmu_import::guard::patiently;
 use fmu_import::raw::{Arguments, Interface, Raw, take_events};
 use std::sync::{Mutex, PoisonError};
@@ -213,11 +214,7 @@ fn copies(session: &Session) -> Result<(), NotDetermined> {
 
 /// Memory of this process in bytes: what is resident, and what is reserved for data.
 fn memory() -> Option<[u64; 2]> {
-    let status = std::fs::read_to_string("/proc/self/status").ok()?;
-    let of = |name: &str| {
-        let line = status.lines().find(|l| l.starts_with(name))?;
-        line.split_whitespace().nth(1)?.parse::<u64>().ok().map(|kib| kib * 1024)
-    };
+    let of = |name| kernel_size("self/status", name);
     Some([of("VmRSS:")?, of("VmData:")?])
 }
 
