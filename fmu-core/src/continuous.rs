@@ -155,7 +155,7 @@ pub trait CompletedSteps: ContinuousTime {
 /// differences.
 pub trait Differentiable: ContinuousTime {
     /// The directional derivative of the derivatives (to `dx`) and of the continuous outputs (to `outputs`) along `along`,
-    /// which has a component for each state and continuous input.
+    /// which has a component for each state and continuous input. The real outputs are zero before the call.
     ///
     /// # Errors
     /// The derivatives do not exist here.

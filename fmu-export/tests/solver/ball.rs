@@ -212,7 +212,11 @@ impl Differentiable for Ball {
             [(self.h, along.h), (self.v, along.v), (self.u, along.u)].map(|(x, change)| Dual::new(x, change));
         let a = self.acceleration(h, v, u).change;
         dx.copy_from_slice(&[if self.resting { 0.0 } else { along.v }, a]);
-        (out.e, out.a, out.v_mean) = (self.energy(h, v, now).change, a, along.v);
+        (out.e, out.v_mean) = (self.energy(h, v, now).change, along.v);
+        if a != 0.0 {
+            // Otherwise it is zero already.
+            out.a = a;
+        }
         Ok(())
     }
 }
