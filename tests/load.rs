@@ -69,7 +69,7 @@ fn instances(standard: &str, count: u32) {
         resident().saturating_sub(before)
     });
     let grown: Vec<u64> = grown.collect();
-    let each = ((most - least) / u64::from(count)) >> 10;
+    let each = (most.saturating_sub(least) / u64::from(count)) >> 10;
     println!("{standard}: {count} instances, {each} KiB each, bytes more after each round: {grown:?}");
     assert!(grown.iter().min().unwrap() < &SLACK, "{standard}: {grown:?} bytes more after {count} instances");
 }
