@@ -4,6 +4,7 @@
 mod common;
 
 use common::python::{environment, pytest_with, run, scratch};
+use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
 use std::process::Command;
 use std::{env, fs, iter, process};
@@ -23,7 +24,7 @@ fn installed() -> PathBuf {
     // maturin is in the environment; it builds in this workspace's target folder.
     pip.arg("--target").arg(&folder).arg(package()).env("PATH", path.expect("a search path"));
     // In the profile of the tests: the crates below are compiled already.
-    pip.env("FMURUN_ARCHIVES", common::archives()).env("MATURIN_PEP517_ARGS", "--profile dev");
+    pip.env("FMURUN_ARCHIVES", common::archives()).env("MATURIN_PEP517_ARGS", "--profile dev --features tests");
     run(&mut pip, "package fmurun").unwrap_or_else(|why| panic!("{why}"));
     folder
 }
@@ -91,6 +92,22 @@ fn the_package() {
     ];
     let files = files.map(|name| format!("test_{name}.py"));
     tests("fmurun", &files.each_ref().map(String::as_str), &[]);
+}
+
+/// The tests compile the dependencies of the package once: with its feature `tests`, each has the same features as in the workspace.
+#[test]
+fn the_dependencies_have_the_features_of_the_workspace() {
+    let features = |selection: &[&str]| -> BTreeSet<String> {
+        let mut cargo = Command::new(env!("CARGO"));
+        cargo.args(["tree", "--locked", "--prefix", "none", "--no-dedupe", "--format", "{p} {f}"]).args(selection);
+        let output = cargo.current_dir(env!("CARGO_MANIFEST_DIR")).output().unwrap();
+        assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
+        String::from_utf8(output.stdout).unwrap().lines().map(str::to_owned).collect()
+    };
+    let alone = features(&["--package", "fmurun", "--edges", "normal,build", "--features", "tests"]);
+    let whole = features(&["--workspace", "--edges", "normal,build,dev"]);
+    let others: Vec<_> = alone.difference(&whole).filter(|line| !line.starts_with("fmurun ")).collect();
+    assert!(alone.len() > 50 && others.is_empty(), "add to python/Cargo.toml what the workspace selects: {others:?}");
 }
 
 /// The figures against FMPy, with their goals: half a minute on an idle machine.

@@ -149,7 +149,14 @@ fn the_commands_alone_depend_on_anyhow() {
 }
 
 /// Dependencies that are not named in the code: they choose a feature of another crate.
-const FEATURES: &[(&str, &str)] = &[("cargo-fmu", "once_cell"), ("fmu-import", "flate2")];
+const FEATURES: &[(&str, &str)] = &[
+    ("cargo-fmu", "once_cell"),
+    ("fmu-import", "flate2"),
+    ("fmurun", "bytemuck"),
+    ("fmurun", "flate2"),
+    ("fmurun", "getrandom"),
+    ("fmurun", "simd-adler32"),
+];
 
 #[test]
 fn every_dependency_is_used() {
