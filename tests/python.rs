@@ -151,6 +151,6 @@ fn install() {
     let bytes = fs::metadata(&wheel).unwrap().len();
     println!("G8   {}: {bytes} bytes, {seconds} s of wall time", wheel.file_name().unwrap().display());
     let _ = fs::remove_dir_all(&folder);
-    // The drives of both standards make up two thirds of it.
-    assert!(bytes <= 12_000_000, "{bytes} bytes");
+    // 12.6 MB on 2026-11-30; the drives of both standards make up four fifths of it.
+    assert!(bytes <= 13_000_000, "{bytes} bytes");
 }
