@@ -5,13 +5,19 @@
 mod common;
 
 use fmu_import::{Fmu, Instance, Kind};
-use std::sync::Barrier;
+use std::sync::{Barrier, Mutex, MutexGuard, PoisonError};
 
 /// Growth in bytes that is no leak: tables of the allocator and of the loader.
 const SLACK: u64 = 512 << 10;
 
 /// Rounds in which the memory is measured.
 const ROUNDS: u32 = 4;
+
+/// The tests run one by one, because each measures the memory of the whole process.
+fn in_turn() -> MutexGuard<'static, ()> {
+    static ONE: Mutex<()> = Mutex::new(());
+    ONE.lock().unwrap_or_else(PoisonError::into_inner)
+}
 
 /// Resident memory in bytes.
 fn resident() -> u64 {
@@ -133,6 +139,7 @@ fn long(standard: &str, name: &str, h: f64, steps: u32) {
 
 #[test]
 fn some_instances_threads_and_minutes() {
+    let _turn = in_turn();
     for standard in ["fmi2", "fmi3"] {
         instances(standard, 500);
         threads(standard, 50, 2);
@@ -144,6 +151,7 @@ fn some_instances_threads_and_minutes() {
 #[test]
 #[ignore = "takes minutes and gigabytes"]
 fn ten_thousand_instances() {
+    let _turn = in_turn();
     for standard in ["fmi2", "fmi3"] {
         instances(standard, 10_000);
     }
@@ -152,6 +160,7 @@ fn ten_thousand_instances() {
 #[test]
 #[ignore = "takes a minute"]
 fn a_thousand_threads() {
+    let _turn = in_turn();
     for standard in ["fmi2", "fmi3"] {
         threads(standard, 1000, 10);
     }
@@ -160,6 +169,7 @@ fn a_thousand_threads() {
 #[test]
 #[ignore = "takes minutes"]
 fn a_day() {
+    let _turn = in_turn();
     let day = |h: f64, steps: u32| assert!((f64::from(steps) * h - 86_400.0).abs() < 1e-3);
     day(0.1, 864_000);
     long("fmi3", "PmsmDriveMean", 0.1, 864_000);

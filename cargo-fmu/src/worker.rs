@@ -100,34 +100,37 @@ pub fn guarded(
     let arguments: Vec<_> = arguments.into_iter().collect();
     let ended = match once(name, &arguments, args)? {
         Worker::Done(outcome) => return outcome,
-        Worker::Died(end, last) => (end, last),
+        Worker::Died(death) => death,
     };
-    let (end, last) = match ended {
-        (end, Some(last)) if threads && !matches!(last.call, Call::Load | Call::Write) && !interrupted_twice() => {
+    let repeated = |last: &Last| threads && !matches!(last.call, Call::Load | Call::Write) && !interrupted_twice();
+    let death = match ended {
+        Death { last: Some(last), .. } if repeated(&last) => {
             crate::message::note(
                 "the FMU has ended its process in one of several runs at once; the same on one thread, for the call",
             );
             let alone: Vec<_> = arguments.into_iter().chain(["--jobs", "1"].map(OsString::from)).collect();
             match once(name, &alone, args)? {
-                Worker::Died(end, last) => (end, last),
+                Worker::Died(death) => death,
                 Worker::Done(Err(error)) => return Err(error),
                 Worker::Done(Ok(())) => {
                     bail!(
                         "{}: several runs at once {}; one after the other (--jobs 1), none did",
                         last.name,
-                        end.describe()
+                        ended.end.describe()
                     )
                 }
             }
         }
         ended => ended,
     };
+    let limit = death.limit(args);
+    let Death { end, last, .. } = death;
     let last = last.map_or_else(|| "the process of the FMUs".into(), |last| last.describe());
     match end {
-        End::Refused(_) => bail!("the process of the FMUs {}", end.describe()),
+        End::Refused(_) => bail!("the process of the FMUs {}{limit}", end.describe()),
         End::Stopped if interrupted_twice() => Err(Failed("interrupted twice: no file is written".into()).into()),
         End::Stopped => bail!("{last} did not return within {} s; --timeout changes the limit", args.timeout),
-        _ => bail!("{last} {}", end.describe()),
+        _ => bail!("{last} {}{limit}", end.describe()),
     }
 }
 
@@ -140,7 +143,32 @@ enum Worker {
     /// With the outcome of the command.
     Done(Result<()>),
     /// Without one, in its last call.
-    Died(End, Option<Last>),
+    Died(Death),
+}
+
+/// The end of a worker without an outcome.
+struct Death {
+    end: End,
+    last: Option<Last>,
+    /// Largest address space seen, in bytes; 0 where the system does not tell it.
+    peak: u64,
+}
+
+impl Death {
+    /// What the limit on address space may have to do with this end: the second half of a message, or nothing.
+    fn limit(&self, args: &ProcessOptions) -> String {
+        let limit = args.memory << 30;
+        let suspected = match &self.end {
+            // ENOMEM.
+            End::Refused(why) => why.contains("(os error 12)"),
+            End::Ended(status) => self.peak > limit / 2 || guard::how(*status).contains("SIGABRT"),
+            _ => false,
+        };
+        if limit == 0 || !suspected {
+            return String::new();
+        }
+        format!("; its address space is limited to {} GiB: --memory changes the limit", args.memory)
+    }
 }
 
 /// Runs the command as a worker.
@@ -156,8 +184,9 @@ fn once(name: &str, arguments: &[OsString], args: &ProcessOptions) -> Result<Wor
     command.args([name, "--worker"]).args(arguments).stdout(io::stderr());
     let mut worker = Guarded::start(command).with_context(|| format!("cannot start {}", program.display()))?;
     let folder = worker.folder().to_owned();
-    let (mut since, mut progress) = (Instant::now(), None);
-    let report = worker.wait(|_| {
+    let (mut since, mut progress, mut peak) = (Instant::now(), None, 0);
+    let report = worker.wait(|id| {
+        peak = id.and_then(|id| guard::kernel_size(&format!("{id}/status"), "VmPeak:")).unwrap_or(peak);
         match INTERRUPTS.load(Ordering::Relaxed) {
             0 => {}
             1 => drop(std::fs::write(folder.join(INTERRUPT), "")),
@@ -193,7 +222,7 @@ fn once(name: &str, arguments: &[OsString], args: &ProcessOptions) -> Result<Wor
                 _ => Err(anyhow!("{cause}")),
             }))
         }
-        _ => Ok(Worker::Died(report.end, journal::read(&folder))),
+        _ => Ok(Worker::Died(Death { end: report.end, last: journal::read(&folder), peak })),
     }
 }
 

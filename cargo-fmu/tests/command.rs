@@ -94,6 +94,8 @@ fn a_model_that_hangs_or_crashes_ends_with_an_error() {
         assert!(output.status.code() == Some(2) && text.lines().count() == 1, "{text}");
         let begins = format!("/{library}: describing the model");
         assert!(text.starts_with("error: ") && text.contains(&begins) && text.contains(part), "{text}");
+        let limit = text.contains("; its address space is limited to 1 GiB: --memory changes the limit");
+        assert_eq!(limit, name != "hangs", "{text}");
         assert!(!dir.path().join("out").exists());
     }
 }

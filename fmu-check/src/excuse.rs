@@ -6,7 +6,7 @@ use crate::check::{Check, Conclusion, Verdict};
 use crate::checks::GROUPS;
 use crate::lines::SAID;
 use crate::runner::{Conditions, OUT_OF_MEMORY, OUT_OF_TIME, Runner};
-use crate::watch::kernel_size;
+use fmu_import::guard::kernel_size;
 use fmu_import::{Folder, limits};
 use std::path::{Path, PathBuf};
 use std::{env, fs, io};

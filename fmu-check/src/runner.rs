@@ -10,9 +10,9 @@ use crate::evidence::{calls, conclude, is_after_free, is_of_second, panic, print
 use crate::fmu_file::FmuFile;
 use crate::lines::Line;
 use crate::probe::NOT_WRITTEN;
-use crate::watch::{Pace, Watch, kernel_size};
+use crate::watch::{Pace, Watch};
 use fmu_import::Folder;
-use fmu_import::guard::{self, Allowance, End, Guarded};
+use fmu_import::guard::{self, Allowance, End, Guarded, kernel_size};
 use fmu_import::limits;
 use model_description::Interface;
 use std::fs::{self, File};

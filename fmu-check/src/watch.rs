@@ -2,7 +2,7 @@
 //! so a busy machine causes no finding.
 
 use std::fs;
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 use std::time::{Duration, Instant};
 
 /// A probe that makes progress is abandoned after this many time limits.
@@ -69,13 +69,6 @@ impl Watch {
             _ => Pace::Runs,
         }
     }
-}
-
-/// A size in bytes from a file in /proc with lines such as `VmRSS:  1234 kB`; `None` on systems without it.
-pub(crate) fn kernel_size(file: &str, name: &str) -> Option<u64> {
-    let text = fs::read_to_string(Path::new("/proc").join(file)).ok()?;
-    let size = text.lines().find_map(|line| line.strip_prefix(name))?;
-    size.split_whitespace().next()?.parse::<u64>().ok()?.checked_mul(1024)
 }
 
 /// The processor time that a process has used, and the state of all its threads at rest: waiting, or stopped by a signal.

@@ -232,6 +232,13 @@ pub fn patiently<T>(mut start: impl FnMut() -> io::Result<T>) -> io::Result<T> {
     }
 }
 
+/// A size in bytes from a file in /proc with lines such as `VmRSS:  1234 kB`; `None` on systems without it.
+pub fn kernel_size(file: &str, name: &str) -> Option<u64> {
+    let text = std::fs::read_to_string(Path::new("/proc").join(file)).ok()?;
+    let size = text.lines().find_map(|line| line.strip_prefix(name))?;
+    size.split_whitespace().next()?.parse::<u64>().ok()?.checked_mul(1024)
+}
+
 /// Signals that the process of this command sends to its process group reach no other process; it calls [`end_with_parent`]
 /// itself. Linux only.
 pub fn own_group(command: &mut Command) {
