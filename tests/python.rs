@@ -110,7 +110,7 @@ fn the_dependencies_have_the_features_of_the_workspace() {
     assert!(alone.len() > 50 && others.is_empty(), "add to python/Cargo.toml what the workspace selects: {others:?}");
 }
 
-/// The figures against FMPy, with their goals: half a minute on an idle machine.
+/// The figures against FMPy, with their goals, of which half must be reached: a minute on an idle machine.
 #[test]
 #[ignore = "opt-in: cargo test --test python figures -- --ignored --nocapture"]
 fn figures() {
