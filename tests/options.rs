@@ -493,7 +493,7 @@ fn inputs(folder: &Path) {
     write("resources/table.txt", "1\n");
     let motor = fs::read_to_string(root.join("motors/reference.toml")).unwrap();
     write("motor.toml", &(motor + "\n[control]\nestimator = \"ExtendedEmf\"\n"));
-    copy("examples/datasheet/drive.toml", "sheet.toml");
+    copy("src/commands/datasheet.toml", "sheet.toml");
     copy("motors/traction-63kw.toml", "traction.toml");
     copy("examples/bench.csv", "bench.csv");
     write("cycle.csv", "t,v\n0,0\n10,20\n20,0\n");

@@ -173,6 +173,28 @@ fn every_dependency_is_used() {
     }
 }
 
+/// A file that the code includes is in its package: another package, or a folder above, is missing from what Cargo packs.
+#[test]
+fn included_files_are_packed() {
+    let mut seen = 0;
+    for (name, (folder, _)) in crates().iter().filter(|(_, (folder, _))| folder.join("src").is_dir()) {
+        let mut files = Vec::new();
+        sources(&folder.join("src"), &mut files);
+        for file in files {
+            let text = std::fs::read_to_string(&file).unwrap();
+            // Tests are not compiled from a package.
+            let code = text.split("#[cfg(test)]").next().unwrap();
+            for part in code.split("include_str!(\"").skip(1).chain(code.split("include_bytes!(\"").skip(1)) {
+                let path = file.parent().unwrap().join(part.split('"').next().unwrap()).canonicalize().unwrap();
+                let owner = path.ancestors().skip(1).find(|folder| folder.join("Cargo.toml").is_file());
+                assert_eq!(owner, Some(folder.canonicalize().unwrap().as_path()), "{name}: {}", path.display());
+                seen += 1;
+            }
+        }
+    }
+    assert!(seen > 5, "{seen} included files");
+}
+
 /// The licenses and the registry that `deny.toml` allows.
 #[test]
 fn every_linked_crate_has_an_allowed_license_and_registry() {

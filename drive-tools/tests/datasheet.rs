@@ -220,7 +220,7 @@ fn both_interfaces_agree() {
 /// The peak torque lasts as long as the data sheet says, then the continuous torque remains.
 #[test]
 fn the_peak_torque_ends() {
-    let sheet = datasheet::read(&root().join("examples/datasheet/drive.toml")).unwrap();
+    let sheet = datasheet::read(&root().join("src/commands/datasheet.toml")).unwrap();
     let mut block = mapped(&sheet);
     (block.model.shaft.imposed, block.model.speed_loop.torque_mode) = (true, true);
     (block.model.inputs.tau_ref, block.model.inputs.speed_shaft) = (100.0, 10.0);
@@ -249,7 +249,7 @@ fn the_peak_torque_ends() {
 
 #[test]
 fn the_example_gives_its_own_points() {
-    let sheet = datasheet::read(&root().join("examples/datasheet/drive.toml")).unwrap();
+    let sheet = datasheet::read(&root().join("src/commands/datasheet.toml")).unwrap();
     let mut block = mapped(&sheet);
     (block.model.shaft.imposed, block.model.speed_loop.torque_mode) = (true, true);
     let rpm = std::f64::consts::PI / 30.0;
@@ -273,7 +273,7 @@ fn the_example_gives_its_own_points() {
 
 #[test]
 fn what_is_wrong_is_named() {
-    let example = fs::read_to_string(root().join("examples/datasheet/drive.toml")).unwrap();
+    let example = fs::read_to_string(root().join("src/commands/datasheet.toml")).unwrap();
     let dir = tempfile::tempdir().unwrap();
     let path = dir.path().join("sheet.toml");
     let refused = |from: &str, to: &str| {

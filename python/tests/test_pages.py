@@ -73,7 +73,7 @@ def workshop(archives, tmp_path_factory):
     shutil.copytree(ROOT / "motors", folder / "motors")
     cycle = (ROOT / "examples/vehicle/cycle.csv").read_text().splitlines()
     (folder / "cycle.csv").write_text("\n".join(cycle[:8]) + "\n")
-    shutil.copy(ROOT / "examples/datasheet/drive.toml", folder / "drive.toml")
+    shutil.copy(ROOT / "src/commands/datasheet.toml", folder / "drive.toml")
     sweep = (ROOT / "examples/sweep.toml").read_text()
     sweep = sweep.replace("../target", "target").replace("stop = 0.2", "stop = 0.16").replace("runs = 100000", "runs = 4")
     (folder / "sweep.toml").write_text(sweep)

@@ -19,8 +19,9 @@ use std::path::PathBuf;
 /// command checks the data sheet, prints what it assumed, and writes NAME.MappedDrive.ssv (SSP 1.0), for importers. With
 /// --fmu it writes an FMU with these start values instead, which needs no parameter file: see `fmu preset`.
 ///
-///   fmu datasheet examples/datasheet/drive.toml --fmu target/fmu/fmi3/MappedDrive.fmu --out MyDrive.fmu
-///   fmu datasheet examples/datasheet/drive.toml --out target/datasheet
+///   fmu datasheet --example > drive.toml
+///   fmu datasheet drive.toml --fmu target/fmu/fmi3/MappedDrive.fmu --out MyDrive.fmu
+///   fmu datasheet drive.toml --out target/datasheet
 #[derive(Debug, Args)]
 #[command(verbatim_doc_comment)]
 pub struct Datasheet {
@@ -42,7 +43,7 @@ pub struct Datasheet {
 }
 
 /// The data sheet of --example.
-const EXAMPLE: &str = include_str!("../../examples/datasheet/drive.toml");
+const EXAMPLE: &str = include_str!("datasheet.toml");
 
 /// Runs the command.
 ///
