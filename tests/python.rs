@@ -110,7 +110,7 @@ fn the_dependencies_have_the_features_of_the_workspace() {
     assert!(alone.len() > 50 && others.is_empty(), "add to python/Cargo.toml what the workspace selects: {others:?}");
 }
 
-/// The figures against FMPy, with their goals, of which half must be reached: a minute on an idle machine.
+/// The figures against FMPy, with their goals: a minute on an idle machine.
 #[test]
 #[ignore = "opt-in: cargo test --test python figures -- --ignored --nocapture"]
 fn figures() {
@@ -151,6 +151,6 @@ fn install() {
     let bytes = fs::metadata(&wheel).unwrap().len();
     println!("G8   {}: {bytes} bytes, {seconds} s of wall time", wheel.file_name().unwrap().display());
     let _ = fs::remove_dir_all(&folder);
-    // 12.6 MB on 2026-11-30; the drives of both standards make up four fifths of it.
-    assert!(bytes <= 13_000_000, "{bytes} bytes");
+    // 12.6 MB on 2026-11-30: missed. The drives of both standards make up four fifths of it.
+    assert!(bytes <= 12_000_000, "{bytes} bytes");
 }

@@ -155,7 +155,7 @@ struct Death {
 }
 
 impl Death {
-    /// What the limit on address space may have to do with this end: the second half of a message, or nothing.
+    /// The limit on address space as the end of a message, if it may be the cause; otherwise nothing.
     fn limit(&self, args: &ProcessOptions) -> String {
         let limit = args.memory << 30;
         let suspected = match &self.end {

@@ -35,7 +35,7 @@ impl Runner {
         excuse.map_or(found, |why| Verdict::NotDetermined(why).into())
     }
 
-    /// A limit is the cause if the run succeeds without it. If that run takes four times the memory, it is an additional finding.
+    /// A limit is the cause if the run succeeds without it. If the run then takes four times the limit, the evidence says so.
     fn limited(&self, check: &Check, conditions: &Conditions, why: &str, found: &mut Conclusion) -> Option<String> {
         let limit = conditions.allowance.memory;
         if limit == 0 {
@@ -54,9 +54,9 @@ impl Runner {
             Verdict::Pass(_) => {}
             Verdict::NotDetermined(end) if end == OUT_OF_MEMORY && resident < most => {
                 return Some(format!(
-                    "with the limit of {gib} GiB of address space, {why}; without it, the run took {} GiB, most of the memory \
-                     that is free on this computer",
-                    resident >> 30
+                    "with the limit of {gib} GiB of address space, {why}; without it, the run took {} MiB, three quarters of \
+                     the memory that is free on this computer",
+                    resident >> 20
                 ));
             }
             Verdict::NotDetermined(end) if end == OUT_OF_MEMORY => {
