@@ -5,7 +5,7 @@ mod common;
 
 use common::pages::module;
 use drive::PmsmDrive;
-use fmu_core::{Block, Capabilities, Description, Elapsed, Exported, Model, Slot, Step};
+use fmu_core::{Block, Capabilities, Constant, Description, Elapsed, Exported, Model, Slot, Step};
 use fmu_pack::page::own::{Own, PresetRun};
 use fmu_pack::page::{Source, judged, page};
 use serde_json::{Value, json};
@@ -45,7 +45,10 @@ fn values<M: Model>(block: &mut Block<M>, names: &[String]) -> Vec<f64> {
         Slot::Real(x) => *x,
         Slot::Boolean(x) => f64::from(u8::from(*x)),
         Slot::Enumeration(x) => x.get().into(),
-        _ => panic!("{at}"),
+        Slot::Constant(Constant::Real(x)) => x,
+        Slot::Constant(Constant::Boolean(x)) => f64::from(u8::from(x)),
+        Slot::Constant(Constant::Enumeration(x)) => x.into(),
+        other => panic!("{at}: {other:?}"),
     };
     places.into_iter().map(&mut one).collect()
 }
@@ -357,8 +360,8 @@ fn pages_in_a_browser() {
     make(&["PmsmDrive"]);
     make(&["--package", "own-fmu", "--package", "faulty-fmu"]);
     let bytes = |name: &str| std::fs::metadata(folder.join(name)).unwrap().len();
-    println!("PmsmDrive.html {} bytes, RcCircuit.html {} bytes", bytes("PmsmDrive.html"), bytes("RcCircuit.html"));
-    assert!(bytes("PmsmDrive.html") <= 600_000 && bytes("RcCircuit.html") <= 260_000);
+    let sizes = ["PmsmDrive.html", "RcCircuit.html"].map(bytes);
+    println!("PmsmDrive.html {} bytes, RcCircuit.html {} bytes", sizes[0], sizes[1]);
     // The experiment of the reference: start angle, speed step, load step, in all real outputs.
     let experiment = PresetRun {
         title: "bits".into(),
@@ -379,4 +382,6 @@ fn pages_in_a_browser() {
     let path: PathBuf = folder.join("expected.json");
     std::fs::write(&path, expected.to_string()).unwrap();
     common::python::pytest("pages", "run-pages", &["test_run_page.py"], &[("FMU_PAGES", &folder)]);
+    // 840,753 and 185,985 bytes on 2026-11-30: the first is missed; at 600,000, the drive had two thirds of its present code.
+    assert!(sizes[0] <= 600_000 && sizes[1] <= 260_000, "{sizes:?} bytes");
 }

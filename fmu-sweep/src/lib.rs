@@ -39,7 +39,7 @@ mod run;
 mod signal;
 mod sweep;
 
-pub use definition::Definition;
+pub use definition::{Definition, MeasureDefinition};
 pub use design::DesignRows;
 pub use error::Error;
 pub use fmu_import::threads::available as threads_here;

@@ -85,7 +85,7 @@ def simulate_fmu(filename, validate=True, start_time=None, stop_time=None, solve
         start_time, stop_time: of the simulation (s); by default the FMU's default experiment, else 0 and one second more
         solver: for Model Exchange: "Dopri" (the default: Dormand-Prince, its step follows `relative_tolerance`, events are
             located), "RK4" (fixed steps of `step_size`), "Euler" (FMPy's); "CVode" is "Dopri" with a warning
-        step_size: of "RK4" (s); by default a thousandth of the time, rounded to a power of ten
+        step_size: of "RK4" and "Euler" (s), not of Co-Simulation; by default a thousandth of the time, rounded to a power of ten
         relative_tolerance: of "Dopri", or of a solver inside the FMU
         output_interval: communication step (s); by default the FMU's, doubled until there are at most 1000 steps
         record_events: Model Exchange: two rows for each event, before and after it
@@ -144,6 +144,10 @@ def simulate_fmu(filename, validate=True, start_time=None, stop_time=None, solve
         way = _solver(solver, times, step_size, tolerance) | {"record_events": record_events}
         tolerance = None
     else:
+        idle = [name for name, value in (("solver", solver), ("step_size", step_size)) if value is not None]
+        if idle:
+            warnings.warn(f"{' and '.join(idle)}: no effect in CoSimulation, where output_interval sets the step; "
+                          "they are for the solvers of ModelExchange", stacklevel=2)  # fmt: skip
         way = {"variable_step": description.coSimulation.canHandleVariableCommunicationStepSize, "event_mode": kind[1]}
     if set_input_derivatives:
         if exchange or description.fmiVersion != "2.0" or not description.coSimulation.canInterpolateInputs:
@@ -438,6 +442,8 @@ def _samples(description, variables, signals):
         raise TypeError(f"input must be a structured numpy array with a column for time, not {type(signals).__name__}")
     signals = np.atleast_1d(signals)
     first, *names = signals.dtype.names
+    if first in variables and variables[first].causality != "independent":
+        raise ValueError(f"input: the first column must be the time in s, not {first}, a variable of {description.modelName}")
     t = np.ascontiguousarray(signals[first], dtype=np.float64)
     if not t.size:
         raise ValueError("input has no row")

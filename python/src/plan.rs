@@ -3,7 +3,7 @@
 use crate::error::{gate, plain, raise};
 use fmu_import::Number;
 use fmu_import::guard::patiently;
-use fmu_sweep::{Definition, RunResults, RunVariable, Sweep};
+use fmu_sweep::{Definition, MeasureDefinition, RunResults, RunVariable, Sweep};
 use numpy::{IntoPyArray, PyArray1, PyReadonlyArray1};
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
@@ -25,7 +25,16 @@ fn failed(error: fmu_sweep::Error) -> PyErr {
 }
 
 fn parsed(definition: &str) -> PyResult<Definition> {
-    serde_json::from_str(definition).map_err(|e| PyValueError::new_err(format!("{e}")))
+    serde_json::from_str(definition).map_err(|error| {
+        // The position is one in a text that the user does not see.
+        let said = |error: serde_json::Error| error.to_string().split(" at line ").next().unwrap_or_default().to_owned();
+        let whole: serde_json::Value = serde_json::from_str(definition).unwrap_or_default();
+        let wrong = whole["measure"].as_object().into_iter().flatten().find_map(|(name, measure)| {
+            let found = serde_json::from_value::<MeasureDefinition>(measure.clone());
+            found.err().map(|error| format!("measure {name}: {}", said(error)))
+        });
+        PyValueError::new_err(wrong.unwrap_or_else(|| said(error)))
+    })
 }
 
 /// The definition of a TOML file, as JSON.

@@ -10,9 +10,6 @@ import fmurun
 import numpy as np
 import pytest
 
-sys.path.insert(0, str(Path(__file__).parents[2] / "tests/common"))
-import notebook
-
 EXAMPLES = Path(__file__).parents[2] / "examples"
 
 
@@ -53,6 +50,9 @@ def test_engines(archives, name):
 
 
 def test_the_notebook_of_the_vehicle(tmp_path, monkeypatch):
+    sys.path.insert(0, str(Path(__file__).parents[2] / "tests/common"))
+    import notebook
+
     notebook.check("vehicle.ipynb", tmp_path, monkeypatch)
 
 

@@ -234,7 +234,7 @@ WRONG = {
     "no design": (lambda p: p.rows(0, 3), FmuError, "has no design"),
     "an output": (lambda p: pair_of(p, output=["p.sped"]).simulate(), FmuError, "has no variable sped"),
     "a measure": (lambda p: pair_of(p, measures={"m": "p.sped"}), FmuError, "has no variable sped"),
-    "a function": (lambda p: pair_of(p, measures={"m": ("p.speed", "maximum")}), ValueError, "unknown variant `maximum`"),
+    "a function": (lambda p: pair_of(p, measures={"m": ("p.speed", "maximum")}), ValueError, "^measure m: unknown variant `maximum`, .*, `settling`$"),
     "a measure of nothing": (lambda p: pair_of(p, measures={"m": 3}), TypeError, "the measure m must be"),
     "a step of zero": (lambda p: pair_of(p, step_size=0.0), ValueError, "step_size must be positive"),
     "a stop": (lambda p: pair_of(p, stop_time=float("nan")), ValueError, "stop_time must be finite"),

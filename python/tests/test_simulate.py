@@ -122,6 +122,7 @@ WRONG = {
     "a unit": ({"start_values": {"motor.R_s": (3.0, "rpm")}}, "unit 'rpm' of the start value of motor.R_s is not one of"),
     "an interval of zero": ({"output_interval": 0.0}, "output_interval must be positive"),
     "a stop that is no number": ({"stop_time": float("nan")}, "must be finite"),
+    "a variable instead of the time": ({"input": np.array([(1.0, 0.0)], dtype=[("tau_load", float), ("time", float)])}, "input: the first column must be the time in s, not tau_load"),
     "times that fall": ({"input": STEP[::-1]}, "must not decrease"),
 }
 
@@ -140,6 +141,11 @@ def test_bad_input_is_told_before_the_run(plant, case):
     arguments, part = WRONG[case]
     with pytest.raises(ValueError, match=part.replace("(", r"\(")):
         simulate_fmu(plant, **arguments)
+
+
+def test_what_belongs_to_model_exchange_is_told(plant):
+    with pytest.warns(UserWarning, match="solver and step_size: no effect in CoSimulation"):
+        simulate_fmu(plant, stop_time=0.01, fmi_type="CoSimulation", solver="RK4", step_size=1e-4)
 
 
 def test_an_error_names_variable_value_and_range(standard):

@@ -5,6 +5,8 @@
 mod common;
 
 mod map;
+#[cfg(unix)]
+mod pages;
 mod simulate;
 
 use std::fs::File;

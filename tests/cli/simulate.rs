@@ -132,7 +132,7 @@ fn bad_usage_names_what_is_wrong() {
         (["--input", "p.u_a=0:0,0:1"], "--input p.u_a=0:0,0:1: the time 0 does not follow 0"),
         (["--input", "nothing.csv"], "--input nothing.csv: "),
         (["--record", "p.nothing"], "p: has no variable nothing"),
-        (["--step", "-1"], "step -1 be positive"),
+        (["--step", "-1"], "step of -1 s must be positive"),
     ] {
         fails(&[&["simulate", p.as_str(), c.as_str()][..], &arguments[..]].concat(), 2, &[part]);
     }

@@ -58,7 +58,7 @@ fn what_can_be_known_before_the_first_run_is_told_before_it() {
         (vary("'d.tau_load' = { uniform = [0, 1] }\n[input]\n'd.tau_load' = '0:1'"), "d.tau_load: is fed by"),
         (vary(&format!("{good}\n[set]\n'd.plant.motor.R_s' = -3")), "R_s = -3"),
         (vary(good).replace("runs = 4", "runs = 0"), "it has no rows"),
-        (vary(good).replace("stop = 0.01", "stop = 0.01\nstep = 0"), "step 0 be positive"),
+        (vary(good).replace("stop = 0.01", "stop = 0.01\nstep = 0"), "step of 0 s must be positive"),
         (vary(good).replace("d.speed'", "d.spede'"), "d: has no variable spede; did you mean speed"),
         (vary(good).replace("d.speed'", "d.speed d.i_d'"), "\"d.i_d\" is not expected"),
         (vary(good).replace("'final'", "'final', after = 2"), "m: after = 2 s, expected a time from 0 to 0.01 s"),

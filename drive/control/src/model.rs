@@ -539,15 +539,20 @@ impl SensorlessController {
             return;
         }
         let Motor { n_p, R_s, L_d, L_q, psi_M } = self.parameters.motor;
-        // A wrong resistance changes the voltage by at most R_s i, which is outweighed by a back EMF or a mismatch of twice that.
+        // A wrong resistance changes the voltage by at most R_s i, which is outweighed by a back EMF or a mismatch of twice that; a dead
+        // time matters at speeds as low.
         let emf = (psi_M * (f64::from(n_p) * out.speed_est).abs()).max(self.state.lock.voltage());
         let matters = emf <= 2.0 * R_s * par.limit.i;
         log.warn("lock_lost", || {
-            let resistance = if matters { format!("R_s = {R_s} Ohm, ") } else { String::new() };
+            let resistive = if matters {
+                format!("R_s = {R_s} Ohm, compensation.u_dead = {} V, ", par.compensation.u_dead)
+            } else {
+                String::new()
+            };
             format!(
                 "lock_lost = {:.2}, 1 or more: the estimate does not fit the applied voltage, or the speed is not reached; \
                  the rotor is not where theta_est = {} rad and speed_est = {} rad/s say, the load exceeds the torque, or the \
-                 controller's {resistance}L_d = {L_d} H, L_q = {L_q} H, psi_M = {psi_M} Wb do not fit the machine",
+                 controller's {resistive}L_d = {L_d} H, L_q = {L_q} H, psi_M = {psi_M} Wb do not fit the machine and its inverter",
                 out.lock_lost, out.theta_est, out.speed_est
             )
         });

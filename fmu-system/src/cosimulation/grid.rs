@@ -49,8 +49,11 @@ impl Settings {
         if ![start, stop, step].iter().all(|x| x.is_finite()) {
             return Err(format!("start {start}, stop {stop} and step {step} must be finite"));
         }
-        if stop <= start || step <= 0.0 {
-            return Err(format!("stop {stop} must be after start {start}, and step {step} be positive"));
+        if stop <= start {
+            return Err(format!("the stop time of {stop} s must be after the start time of {start} s"));
+        }
+        if step <= 0.0 {
+            return Err(format!("the step of {step} s must be positive"));
         }
         let count = (stop - start) / step;
         // A millionth of a step is rounding, more is a shorter last step.
