@@ -39,6 +39,7 @@ use drive_control::signals::ControllerOutputs;
 use drive_control::tables::{self as control, ESTIMATES, STATUS, VOLTAGES};
 #[cfg(doc)]
 use drive_plant::PmsmPlant;
+use drive_plant::following::Following;
 use drive_plant::signals::{PlantInputs, PlantOutputs};
 use drive_plant::tables as plant;
 use fmu_core::log::Warnings;
@@ -94,6 +95,8 @@ pub struct PmsmDrive {
     before: Commanded,
     period: Period,
     overload: Happened,
+    /// The angle of an imposed shaft beside its speed, over communication steps.
+    following: Following,
 }
 
 /// Occurrence of a condition that is reported once, such as a load far above the torque of the drive.
@@ -230,7 +233,7 @@ impl Model for PmsmDrive {
 
     const ICON: Option<&'static str> = Some(include_str!("../icons/pmsm_drive.svg"));
 
-    const STATE_VERSION: u16 = 32;
+    const STATE_VERSION: u16 = 33;
 
     fn idle(&self, name: &str) -> Option<&'static str> {
         let (plant, controller) = (&self.pair.plant.model.parameters, &self.pair.controller.model.parameters);
@@ -283,6 +286,7 @@ impl Model for PmsmDrive {
         self.convert_limits();
         self.period = Period::new(self.pair.plant.out.powers);
         self.overload = Happened::default();
+        self.following = Following::default();
         self.before = self.pair.plant.model.inputs.commanded();
         self.unsettled = self.begins_steadily() && !self.begin_steady();
         self.convert_limits();
@@ -311,6 +315,10 @@ impl Model for PmsmDrive {
     fn advance(&mut self, step: &Step) -> Result<(), Fault> {
         self.set_inputs();
         self.link.begin(step.h);
+        if self.pair.plant.model.parameters.mechanics.imposed {
+            let DriveInputs { speed_shaft, angle_shaft, .. } = self.inputs;
+            self.following.count(speed_shaft * step.h, angle_shaft - self.pair.plant.out.angle);
+        }
         let Self { inputs, pair, period, link, link_parameters, calibration, .. } = self;
         let linked = link_parameters.dc_link.used;
         let grid = SampleGrid { period: pair.controller.model.parameters.T_s };
@@ -413,6 +421,7 @@ impl Warns for PmsmDrive {
             }
         }
         plant.warn(log);
+        self.following.warn(self.inputs.angle_shaft, self.inputs.speed_shaft, log);
         let controller = &self.pair.controller.model;
         match &self.calibration {
             Some(calibration) => controller.warn_with(log, self.inputs.tau_ref, calibration.limits),

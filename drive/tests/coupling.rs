@@ -3,7 +3,7 @@
 
 use drive::{PmsmDrive, PmsmPlant};
 use fmu_core::log::Warnings;
-use fmu_core::{Block, ContinuousTime, Elapsed, Model, Step, Warns};
+use fmu_core::{Block, CompletedSteps, ContinuousTime, Elapsed, Model, Step, Warns};
 
 const REMEDY: &str = "the coupling is unstable; shorten the communication step";
 
@@ -162,4 +162,69 @@ fn a_lost_rotor_at_speed_is_not_blamed_on_the_resistance() {
     assert!(logged.iter().all(|(_, text)| !text.contains("R_s")), "{logged:?}");
     let driven: Vec<_> = logged.iter().filter(|(key, _)| *key == "driven").collect();
     assert!(driven.iter().all(|(_, text)| text.contains("shorten the communication step")), "{driven:?}");
+}
+
+/// Whether a model with an imposed shaft at 100 rad/s, in steps of this length (s), reports that its angle does not follow, within
+/// 0.2 s.
+macro_rules! reports {
+    ($model:ty, $plant:ident => $parameters:expr, $h:expr, $angle:expr) => {{
+        let mut block = Block::<$model>::default();
+        let $plant = &mut block.model;
+        $parameters.mechanics.imposed = true;
+        block.model.inputs.speed_shaft = 100.0;
+        block.model.inputs.angle_shaft = $angle(0.0);
+        block.initialize();
+        let (mut now, mut said) = (Elapsed::ZERO, String::new());
+        while now.seconds() < 0.2 {
+            block.model.inputs.angle_shaft = $angle(100.0 * now.seconds());
+            let step = Step { start: now, h: $h };
+            block.step(&step).unwrap();
+            now = step.end();
+            block.model.warn(&mut Warnings::to(&mut |(_, key, text)| {
+                if key == "angle_shaft" {
+                    said = text();
+                }
+            }));
+        }
+        assert!(said.is_empty() || said.contains("does not follow speed_shaft = 100 rad/s"), "{said}");
+        !said.is_empty()
+    }};
+}
+
+#[test]
+fn an_angle_that_does_not_follow_the_speed_is_reported() {
+    use std::f64::consts::TAU;
+    let wrong: [fn(f64) -> f64; 3] = [|_| 0.0, f64::to_degrees, |angle| -angle];
+    let right: [fn(f64) -> f64; 2] = [|angle| angle, |angle| angle.rem_euclid(TAU)];
+    for h in [1e-4, 1e-3, 4e-3] {
+        for (of, expected) in wrong.into_iter().map(|of| (of, true)).chain(right.map(|of| (of, false))) {
+            let at = of(1.0);
+            assert_eq!(
+                reports!(PmsmPlant, plant => plant.parameters, h, of),
+                expected,
+                "PmsmPlant, {h} s, 1 rad: {at}"
+            );
+            let drive = reports!(PmsmDrive, drive => drive.pair.plant.model.parameters, h, of);
+            assert_eq!(drive, expected, "PmsmDrive, {h} s, 1 rad: {at}");
+        }
+    }
+}
+
+/// In Model Exchange, where the importer's solver chooses its points.
+#[test]
+fn model_exchange_reports_such_an_angle() {
+    for (share, expected) in [(0.0, true), (1.0, false)] {
+        let mut block = Block::<PmsmPlant>::default();
+        block.model.parameters.mechanics.imposed = true;
+        block.initialize();
+        let mut said = false;
+        for k in 1..100_u32 {
+            let t = 1e-3 * f64::from(k);
+            let inputs = &mut block.model.inputs;
+            (inputs.speed_shaft, inputs.angle_shaft) = (1000.0 * t, share * 500.0 * t * t);
+            block.model.complete(Elapsed::between(0.0, t)).unwrap();
+            block.model.warn(&mut Warnings::to(&mut |(_, key, _)| said |= key == "angle_shaft"));
+        }
+        assert_eq!(said, expected, "{share}");
+    }
 }

@@ -27,7 +27,8 @@ fn failed(error: fmu_sweep::Error) -> PyErr {
 fn parsed(definition: &str) -> PyResult<Definition> {
     serde_json::from_str(definition).map_err(|error| {
         // The position is one in a text that the user does not see.
-        let said = |error: serde_json::Error| error.to_string().split(" at line ").next().unwrap_or_default().to_owned();
+        let said =
+            |error: serde_json::Error| error.to_string().split(" at line ").next().unwrap_or_default().to_owned();
         let whole: serde_json::Value = serde_json::from_str(definition).unwrap_or_default();
         let wrong = whole["measure"].as_object().into_iter().flatten().find_map(|(name, measure)| {
             let found = serde_json::from_value::<MeasureDefinition>(measure.clone());

@@ -1,5 +1,6 @@
 //! What a step changes: kept before a step and restored if the step fails, by callers that go on with the plant.
 
+use crate::following::Following;
 use crate::model::PmsmPlant;
 use crate::power::{Energy, Powers};
 use crate::signals::PlantInputs;
@@ -19,6 +20,7 @@ pub struct Checkpoint {
     warm: Warm,
     by_iron: Dq,
     bridge: Bridge,
+    following: Following,
 }
 
 impl PmsmPlant {
@@ -26,8 +28,20 @@ impl PmsmPlant {
     pub fn checkpoint(&self) -> Checkpoint {
         // Every field is named, so a new one does not compile until it is considered here. Model Exchange alone uses `point` and
         // `kept`.
-        let Self { inputs, parameters: _, state, blocked, powers, energy, point: _, kept: _, warm, by_iron, bridge } =
-            self;
+        let Self {
+            inputs,
+            parameters: _,
+            state,
+            blocked,
+            powers,
+            energy,
+            point: _,
+            kept: _,
+            warm,
+            by_iron,
+            bridge,
+            following,
+        } = self;
         Checkpoint {
             inputs: inputs.clone(),
             state: *state,
@@ -37,14 +51,16 @@ impl PmsmPlant {
             warm: warm.clone(),
             by_iron: *by_iron,
             bridge: bridge.clone(),
+            following: *following,
         }
     }
 
     /// Goes back to a checkpoint.
     pub fn restore(&mut self, checkpoint: Checkpoint) {
-        let Checkpoint { inputs, state, blocked, powers, energy, warm, by_iron, bridge } = checkpoint;
+        let Checkpoint { inputs, state, blocked, powers, energy, warm, by_iron, bridge, following } = checkpoint;
         (self.inputs, self.state, self.blocked, self.powers) = (inputs, state, blocked, powers);
         (self.energy, self.warm, self.by_iron, self.bridge) = (energy, warm, by_iron, bridge);
+        self.following = following;
     }
 }
 

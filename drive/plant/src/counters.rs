@@ -45,6 +45,11 @@ impl PmsmPlant {
         let h = now.since(self.point.time);
         if h > 0.0 {
             let (energy, impulse) = self.between(&self.point, inputs, h)?;
+            if self.parameters.mechanics.imposed {
+                let start = &self.point.inputs;
+                let turn = 0.5 * (start.speed_shaft + inputs.speed_shaft) * h;
+                self.following.count(turn, inputs.angle_shaft - start.angle_shaft - turn);
+            }
             self.energy.add(&energy);
             self.point.impulse += impulse;
         }

@@ -17,6 +17,7 @@ mod damping;
 pub mod documentation;
 pub mod exchange;
 pub mod flux_map;
+pub mod following;
 pub mod idle;
 mod integration;
 pub mod inverter;

@@ -1,5 +1,6 @@
 //! The model `PmsmPlant`: inverter, machine and mechanics, integrated with constant inputs.
 
+use crate::following::Following;
 use crate::idle;
 use crate::inverter::Gates;
 use crate::legs::Legs;
@@ -51,6 +52,8 @@ pub struct PmsmPlant {
     pub(super) by_iron: Dq,
     /// Carrier and legs of the switched inverter.
     pub(super) bridge: Bridge,
+    /// The angle of an imposed shaft beside its speed.
+    pub(super) following: Following,
 }
 
 impl PmsmPlant {
@@ -205,7 +208,7 @@ impl Model for PmsmPlant {
 
     const ICON: Option<&'static str> = Some(include_str!("../icons/pmsm_plant.svg"));
 
-    const STATE_VERSION: u16 = 16;
+    const STATE_VERSION: u16 = 17;
 
     fn idle(&self, name: &str) -> Option<&'static str> {
         let PlantInputs { u_dc, speed_shaft, angle_shaft, .. } = self.inputs;
@@ -249,6 +252,7 @@ impl Model for PmsmPlant {
         let psi = if self.inputs.is_off() { self.idle_flux(motor, speed) } else { machine::flux(motor, Dq::ZERO) };
         self.state = State::new(motor, psi, speed, angle);
         (self.energy, self.point, self.kept) = (Energy::default(), Accepted::default(), Kept::default());
+        self.following = Following::default();
         self.blocked = self.blocks(&self.inputs);
         self.bridge = Bridge::default();
         self.by_iron = self.current_by_iron();
@@ -272,6 +276,9 @@ impl Model for PmsmPlant {
 
     #[inline]
     fn advance(&mut self, step: &Step) -> Result<(), Fault> {
+        if self.parameters.mechanics.imposed {
+            self.follow(step.h);
+        }
         if self.parameters.thermal.mode == ThermalMode::Constant {
             self.advance_at_temperature(step)
         } else {
@@ -293,6 +300,7 @@ impl Warns for PmsmPlant {
         if !self.parameters.is_linear() {
             self.parameters.magnetics().warn(&self.warm.motor, self.state.psi, log);
         }
+        self.following.warn(self.inputs.angle_shaft, self.inputs.speed_shaft, log);
     }
 }
 

@@ -1,0 +1,110 @@
+//! Whether the angle of an imposed shaft follows its speed.
+//!
+//! With `mechanics.imposed`, speed and angle of the shaft are inputs. An angle that is not connected, that is in degrees, electrical, reversed
+//! or behind a gear puts the rotor back or ahead in every step: the flux linkage of the stator stays where it is, and the currents
+//! and the torque of the machine are wrong. Of each step, this deviation counts at most as much as the turn by the speed, so that a
+//! wrapped angle, or one that jumps once, counts little. During a steady acceleration, a step of Co-Simulation that begins with
+//! the speed at its beginning deviates by half of the change of the speed: a share of 1/n after n steps from rest.
+
+use crate::model::PmsmPlant;
+use crate::signals::PlantInputs;
+use drive_base::math::wrap;
+use fmu_core::log::Warnings;
+use serde::{Deserialize, Serialize};
+
+/// Turn of the shaft in rad before it is judged; twice as much fades to half.
+const ENOUGH: f64 = 1.0;
+
+/// Share of the turn by which the angle may deviate.
+const ALLOWED: f64 = 0.7;
+
+/// Turn and deviation of the last radians.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct Following {
+    /// Angle in rad by which the shaft turned at its speed, in both directions.
+    turned: f64,
+    /// Angle in rad by which its angle turned more than that.
+    off: f64,
+}
+
+impl Following {
+    /// Counts a step in which the shaft turned by `turn` (rad) at its speed, and its angle by `off` (rad) more.
+    pub fn count(&mut self, turn: f64, off: f64) {
+        let most = turn.abs();
+        self.turned += most;
+        self.off += (wrap(off) * turn.signum()).max(-most).min(most);
+        if self.turned > 2.0 * ENOUGH {
+            (self.turned, self.off) = (0.5 * self.turned, 0.5 * self.off);
+        }
+    }
+
+    fn fails(self) -> bool {
+        self.turned > ENOUGH && self.off.abs() > ALLOWED * self.turned
+    }
+
+    /// Warns of an angle (rad) that does not follow the speed (rad/s).
+    pub fn warn(self, angle: f64, speed: f64, log: &mut Warnings<'_>) {
+        if self.fails() {
+            log.warn("angle_shaft", || {
+                format!(
+                    "angle_shaft = {angle} rad does not follow speed_shaft = {speed} rad/s, and the results are wrong: give the mechanical \
+                     angle of the same shaft in rad, the integral of the speed; it may be wrapped to a turn"
+                )
+            });
+        }
+    }
+}
+
+impl PmsmPlant {
+    /// Counts a step of `h` (s) of Co-Simulation with an imposed shaft, at its beginning.
+    #[cold]
+    #[inline(never)]
+    pub(super) fn follow(&mut self, h: f64) {
+        let PlantInputs { speed_shaft, angle_shaft, .. } = self.inputs;
+        self.following.count(speed_shaft * h, angle_shaft - self.state.angle);
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Whether 1000 steps of 1 ms at the speed (rad/s) `speed(t)` and the angle `of(angle)` fail, and after how many.
+    fn first(speed: impl Fn(f64) -> f64, of: impl Fn(f64) -> f64) -> Option<usize> {
+        let (mut following, mut angle, h) = (Following::default(), 0.3, 1e-3);
+        let mut expected = of(angle);
+        (0..1000)
+            .find(|&k| {
+                let t = f64::from(k) * h;
+                let w = speed(t);
+                following.count(w * h, of(angle) - expected);
+                expected = of(angle) + w * h;
+                // The drive train turns on with its own steps.
+                angle += 0.5 * (w + speed(t + h)) * h;
+                following.fails()
+            })
+            .map(|k| usize::try_from(k).unwrap())
+    }
+
+    #[test]
+    fn wrong_angles_are_found_and_right_ones_are_not() {
+        use std::f64::consts::TAU;
+        let speeds: [fn(f64) -> f64; 4] = [|_| 200.0, |_| -200.0, |t| 2000.0 * t, |t| 100.0 + 50.0 * (300.0 * t).sin()];
+        for (k, speed) in speeds.into_iter().enumerate() {
+            assert_eq!(first(speed, |angle| angle), None, "{k}");
+            assert_eq!(first(speed, |angle| angle.rem_euclid(TAU)), None, "{k}, wrapped");
+            assert_eq!(first(speed, |angle| 5.0 + angle), None, "{k}, from another angle");
+            let wrong: [fn(f64) -> f64; 5] =
+                [|_| 0.0, |angle| angle.to_degrees(), |angle| 3.0 * angle, |angle| -angle, |angle| angle / 9.0];
+            for (m, of) in wrong.into_iter().enumerate() {
+                assert!(first(speed, of).is_some_and(|k| k < 100), "{k}, {m}: {:?}", first(speed, of));
+            }
+        }
+        // From rest, with steps in which the speed doubles, triples and so on.
+        assert_eq!(first(|t| 1e5 * t, |angle| angle), None, "100 rad/s more in each step");
+        assert_eq!(first(|_| 0.0, |angle| angle * 2.0), None, "at rest");
+        // Through zero.
+        assert_eq!(first(|t| 50.0 * (40.0 * t).cos(), |angle| angle), None, "to and fro");
+        assert!(first(|t| 50.0 * (40.0 * t).cos(), |_| 1.0).is_some(), "to and fro with a fixed angle");
+    }
+}
