@@ -56,3 +56,41 @@ fn a_load_above_the_torque_is_reported() {
         message(Block::<MappedDrive>::default(), tau, set)
     });
 }
+
+/// The message about a speed reference (rad/s) that is not reached, in 12 s.
+fn not_reached<M: Model + Warns>(set: impl FnOnce(&mut M)) -> Option<String> {
+    let (mut block, mut now, mut said) = (Block::<M>::default(), Elapsed::ZERO, None);
+    set(&mut block.model);
+    block.initialize();
+    while now.seconds() < 12.0 {
+        let step = Step { start: now, h: 1e-3 };
+        block.step(&step).unwrap();
+        now = step.end();
+        block.model.warn(&mut Warnings::to(&mut |(_, key, text): Said<'_>| {
+            if key == "speed_ref" {
+                said.get_or_insert_with(text);
+            }
+        }));
+    }
+    said
+}
+
+/// 3000 rpm are 314 rad/s: 3000 rad/s are beyond the voltage of the link.
+#[test]
+fn a_speed_beyond_the_voltage_is_reported() {
+    for (speed, reported) in [(300.0, false), (3000.0, true), (-3000.0, true)] {
+        let drive = not_reached(|m: &mut PmsmDrive| m.inputs.speed_ref = speed);
+        let weakening = not_reached(|m: &mut PmsmDrive| {
+            (m.inputs.speed_ref, m.pair.controller.model.parameters.weakening.used) = (speed, true);
+        });
+        let mean = not_reached(|m: &mut PmsmDriveMean| m.inputs.speed_ref = speed);
+        for (name, said) in [("drive", drive), ("weakening", weakening), ("mean", mean)] {
+            println!("{name}, {speed} rad/s: {said:?}");
+            assert_eq!(said.is_some(), reported, "{name}, {speed} rad/s: {said:?}");
+            assert!(
+                said.is_none_or(|text| text.contains(&format!("speed_ref = {speed} rad/s is not reached"))),
+                "{name}"
+            );
+        }
+    }
+}

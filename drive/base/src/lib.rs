@@ -17,6 +17,7 @@
 #![allow(non_snake_case)]
 
 pub mod connection;
+pub mod degrees;
 pub mod documentation;
 pub mod frame;
 pub mod hexagon;

@@ -9,7 +9,6 @@ use crate::idle;
 use crate::lock::{LOST, Lock};
 use crate::modes::{Follows, MODE_INPUTS};
 use crate::one_shunt::OneShunt;
-use crate::overload::Overload;
 use crate::position::{Position, PositionSensor};
 use crate::sensor::MeasuredPhases;
 use crate::signals::{ControllerInputs, ControllerOutputs};
@@ -19,6 +18,7 @@ use crate::state::{InUse, State, context};
 use crate::tables::{ControllerParameters, OUTPUTS, PARAMETERS};
 use crate::trip::{Cause, Trip};
 use crate::zero_speed::ZeroSpeed;
+use drive_base::degrees;
 use drive_base::frame::Phases;
 use drive_base::hexagon::within_hexagon;
 use drive_base::motor::Motor;
@@ -360,7 +360,7 @@ impl Model for SensorlessController {
 
     const ICON: Option<&'static str> = Some(include_str!("../icons/sensorless_controller.svg"));
 
-    const STATE_VERSION: u16 = 27;
+    const STATE_VERSION: u16 = 28;
 
     fn idle(&self, name: &str) -> Option<&'static str> {
         if name == "u_dc" && self.inputs.u_dc == 0.0 {
@@ -496,6 +496,8 @@ impl SensorlessController {
                 )
             });
         }
+        degrees::warn("initial.theta_est", par.theta_est, log);
+        degrees::warn("sensor.angle_offset", par.position.angle_offset, log);
         if let Some(why) = self.not_caught() {
             log.warn("catch", || why.clone());
         }
@@ -508,8 +510,8 @@ impl SensorlessController {
         if follows && par.speed_loop.torque_mode && self.state.limited_for >= 1.0 && beyond {
             log.warn("tau_ref", || clipped(asked, limits));
         }
-        if !par.speed_loop.torque_mode && self.state.overload.reports() {
-            log.warn("overload", || Overload::message([out.speed_est, self.state.w_ref], limits));
+        if !par.speed_loop.torque_mode {
+            self.state.overload.warn([out.speed_est, self.state.w_ref], || limits, log);
         }
         if let Some(time) = self.state.stands.reached(par) {
             log.warn("stands", || stands::hidden(par, asked, out.speed_est, time));

@@ -16,6 +16,7 @@ use crate::tables::{FLUX, OUTPUTS, PARAMETERS, PlantParameters};
 use crate::thermal::warm::Warm;
 use crate::thermal::{THERMAL_INPUTS, Temperatures, ThermalMode};
 use drive_base::connection::Measured;
+use drive_base::degrees;
 use drive_base::frame::{Dq, Phases, Rotor, Vector};
 use drive_base::math::wrap;
 use drive_base::motor::Motor;
@@ -300,6 +301,7 @@ impl Warns for PmsmPlant {
         if !self.parameters.is_linear() {
             self.parameters.magnetics().warn(&self.warm.motor, self.state.psi, log);
         }
+        degrees::warn("initial.theta_e", self.parameters.initial.theta_e, log);
         self.following.warn(self.inputs.angle_shaft, self.inputs.speed_shaft, log);
     }
 }

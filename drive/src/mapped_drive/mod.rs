@@ -117,7 +117,7 @@ impl Model for MappedDrive {
 
     const ICON: Option<&'static str> = Some(include_str!("../../icons/pmsm_drive.svg"));
 
-    const STATE_VERSION: u16 = 3;
+    const STATE_VERSION: u16 = 4;
 
     const CONTINUOUS: bool = true;
 
@@ -184,10 +184,7 @@ impl Warns for MappedDrive {
                 format!("u_dc = {u_dc} V is outside {u_min} to {u_max} V (map.u_min, map.u_max): the drive is off")
             });
         }
-        if self.load.reports() {
-            let speeds = [speed, self.state.speed_ref];
-            log.warn("overload", || Overload::message(speeds, self.point(&self.state).limits));
-        }
+        self.load.warn([speed, self.state.speed_ref], || self.point(&self.state).limits, log);
         if self.clipped_for >= 1.0 {
             log.warn("tau_ref", || clipped(self.inputs.tau_ref, self.point(&self.state).limits));
         }

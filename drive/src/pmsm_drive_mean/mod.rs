@@ -324,7 +324,7 @@ impl Model for PmsmDriveMean {
 
     const ICON: Option<&'static str> = Some(include_str!("../../icons/pmsm_drive.svg"));
 
-    const STATE_VERSION: u16 = 10;
+    const STATE_VERSION: u16 = 11;
 
     const CONTINUOUS: bool = true;
 
@@ -495,10 +495,8 @@ impl Warns for PmsmDriveMean {
                 )
             });
         }
-        if self.overload.reports() {
-            let speeds = [self.speed(&self.state), self.state.speed_ref];
-            log.warn("overload", || Overload::message(speeds, self.limits(&self.state, &self.point)));
-        }
+        let speeds = [self.speed(&self.state), self.state.speed_ref];
+        self.overload.warn(speeds, || self.limits(&self.state, &self.point), log);
         if self.clipped_for >= 1.0 {
             log.warn("tau_ref", || clipped(self.inputs.tau_ref, self.limits(&self.state, &self.point)));
         }
