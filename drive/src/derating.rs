@@ -8,6 +8,8 @@
 //! The full torque is that of the current and torque limits below the base speed; field weakening and the limits of the DC link act
 //! besides. The drive measures the winding's temperature exactly. T in K.
 
+use drive_base::implausible;
+use fmu_core::log::Warnings;
 use fmu_core::unit::{KELVIN, ONE};
 use fmu_core::{Fault, Row, Table, table};
 use serde::{Deserialize, Serialize};
@@ -94,6 +96,18 @@ impl Derating {
             return Err(DERATING.fault(self, |p| &mut p.T_winding_max, format!("above {from}")));
         }
         Ok(())
+    }
+}
+
+impl Derating {
+    /// Warns of temperatures that look like degrees Celsius.
+    pub fn warn(&self, log: &mut Warnings<'_>) {
+        if self.used && self.by_table {
+            implausible::temperature("limit.T_winding_at", self.at[0], log);
+        } else if self.used {
+            implausible::temperature("limit.T_winding", self.T_winding, log);
+            implausible::temperature("limit.T_winding_max", self.T_winding_max, log);
+        }
     }
 }
 

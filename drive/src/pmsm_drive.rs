@@ -421,6 +421,7 @@ impl Warns for PmsmDrive {
             }
         }
         plant.warn(log);
+        self.derating.warn(log);
         self.following.warn(self.inputs.angle_shaft, self.inputs.speed_shaft, log);
         let controller = &self.pair.controller.model;
         match &self.calibration {

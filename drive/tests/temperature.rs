@@ -14,9 +14,10 @@ use drive::frame::{AlphaBeta, Phases};
 use drive::motor::Motor;
 use drive::plant::power::Powers;
 use drive::plant::thermal::network::Network;
-use drive::plant::thermal::{Temperatures, Thermal, ThermalMode};
-use drive::{Pair, PmsmDrive, PmsmPlant};
-use fmu_core::{Block, ContinuousTime, Elapsed, Events, Interface, Model, Step};
+use drive::plant::thermal::{Temperatures, Thermal, ThermalInputs, ThermalMode};
+use drive::{Pair, PmsmDrive, PmsmDriveMean, PmsmPlant};
+use fmu_core::log::Warnings;
+use fmu_core::{Block, ContinuousTime, Elapsed, Events, Interface, Model, Step, Warns};
 
 const RPM: f64 = std::f64::consts::PI / 30.0;
 const ZERO: f64 = 273.15;
@@ -474,4 +475,44 @@ fn model_exchange_has_no_network() {
     block.model.inputs.thermal.imposed.winding = 1.0;
     let fault = block.model.event(Elapsed::ZERO).unwrap_err();
     assert!(fault.message().contains("T_winding_imposed = 1 K"), "{fault}");
+}
+
+/// Degrees Celsius instead of K, and degrees instead of rad: the run goes on, and the warning names both readings.
+#[test]
+fn values_in_another_unit_are_reported() {
+    macro_rules! said {
+        ($model:ty, $drive:ident => $set:expr) => {{
+            let mut block = Block::<$model>::default();
+            let $drive = &mut block.model;
+            $set;
+            block.initialize();
+            block.step(&Step { start: Elapsed::ZERO, h: 1e-3 }).unwrap();
+            let mut keys = Vec::new();
+            block.model.warn(&mut Warnings::to(&mut |(_, key, text)| {
+                if text().contains("80 deg") || text().contains("80 K") {
+                    keys.push(key);
+                }
+            }));
+            keys
+        }};
+    }
+    let imposed = |thermal: &mut Thermal, inputs: &mut ThermalInputs| {
+        thermal.mode = ThermalMode::Imposed;
+        inputs.imposed.winding = 80.0;
+    };
+    assert_eq!(said!(PmsmPlant, m => m.parameters.thermal.T_start = 80.0), ["thermal.T_start"]);
+    assert_eq!(said!(PmsmPlant, m => m.parameters.initial.theta_e = 180.0), ["initial.theta_e"]);
+    assert_eq!(said!(PmsmPlant, m => imposed(&mut m.parameters.thermal, &mut m.inputs.thermal)), ["T_winding_imposed"]);
+    assert_eq!(said!(PmsmDrive, m => m.pair.plant.model.parameters.thermal.T_start = 80.0), ["thermal.T_start"]);
+    assert_eq!(
+        said!(PmsmDrive, m => imposed(&mut m.pair.plant.model.parameters.thermal, &mut m.inputs.thermal)),
+        ["T_winding_imposed"]
+    );
+    assert_eq!(said!(PmsmDrive, m => (m.derating.used, m.derating.T_winding) = (true, 80.0)), ["limit.T_winding"]);
+    assert_eq!(said!(PmsmDrive, m => m.pair.controller.model.parameters.theta_est = -180.0), ["initial.theta_est"]);
+    assert_eq!(said!(PmsmDriveMean, m => m.drive.plant.thermal.T_start = 80.0), ["thermal.T_start"]);
+    assert_eq!(
+        said!(PmsmDriveMean, m => (m.drive.derating.used, m.drive.derating.T_winding) = (true, 80.0)),
+        ["limit.T_winding"]
+    );
 }

@@ -17,10 +17,10 @@
 #![allow(non_snake_case)]
 
 pub mod connection;
-pub mod degrees;
 pub mod documentation;
 pub mod frame;
 pub mod hexagon;
+pub mod implausible;
 pub mod integrate;
 pub mod math;
 pub mod modulation;

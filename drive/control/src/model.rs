@@ -18,9 +18,9 @@ use crate::state::{InUse, State, context};
 use crate::tables::{ControllerParameters, OUTPUTS, PARAMETERS};
 use crate::trip::{Cause, Trip};
 use crate::zero_speed::ZeroSpeed;
-use drive_base::degrees;
 use drive_base::frame::Phases;
 use drive_base::hexagon::within_hexagon;
+use drive_base::implausible;
 use drive_base::motor::Motor;
 use drive_base::overmodulation::ModulationMode;
 use fmu_core::idle::why;
@@ -496,8 +496,8 @@ impl SensorlessController {
                 )
             });
         }
-        degrees::warn("initial.theta_est", par.theta_est, log);
-        degrees::warn("sensor.angle_offset", par.position.angle_offset, log);
+        implausible::angle("initial.theta_est", par.theta_est, log);
+        implausible::angle("sensor.angle_offset", par.position.angle_offset, log);
         if let Some(why) = self.not_caught() {
             log.warn("catch", || why.clone());
         }

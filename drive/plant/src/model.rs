@@ -16,8 +16,8 @@ use crate::tables::{FLUX, OUTPUTS, PARAMETERS, PlantParameters};
 use crate::thermal::warm::Warm;
 use crate::thermal::{THERMAL_INPUTS, Temperatures, ThermalMode};
 use drive_base::connection::Measured;
-use drive_base::degrees;
 use drive_base::frame::{Dq, Phases, Rotor, Vector};
+use drive_base::implausible;
 use drive_base::math::wrap;
 use drive_base::motor::Motor;
 use fmu_core::idle::why;
@@ -301,7 +301,8 @@ impl Warns for PmsmPlant {
         if !self.parameters.is_linear() {
             self.parameters.magnetics().warn(&self.warm.motor, self.state.psi, log);
         }
-        degrees::warn("initial.theta_e", self.parameters.initial.theta_e, log);
+        implausible::angle("initial.theta_e", self.parameters.initial.theta_e, log);
+        self.parameters.thermal.warn(&self.inputs.thermal, log);
         self.following.warn(self.inputs.angle_shaft, self.inputs.speed_shaft, log);
     }
 }

@@ -500,7 +500,9 @@ impl Warns for PmsmDriveMean {
         if self.clipped_for >= 1.0 {
             log.warn("tau_ref", || clipped(self.inputs.tau_ref, self.limits(&self.state, &self.point)));
         }
+        self.drive.derating.warn(log);
         let plant = &self.drive.plant;
+        plant.thermal.warn(&self.inputs.thermal, log);
         if !plant.is_linear() {
             let motor = plant.thermal.motor(&plant.motor, &self.temperatures());
             plant.magnetics().warn(&motor, self.point.psi, log);

@@ -24,7 +24,9 @@ pub mod parts;
 pub mod warm;
 
 use crate::losses::Losses;
+use drive_base::implausible;
 use drive_base::motor::Motor;
+use fmu_core::log::Warnings;
 use fmu_core::unit::KELVIN;
 use fmu_core::{Field, Part, Row, Scalar, Table, enumeration, table};
 use network::{NETWORK, Network};
@@ -90,6 +92,26 @@ impl Thermal {
         let resistance = factor(self.alpha_R, at.winding, self.T_ref);
         let magnet = factor(self.alpha_psi, at.magnet, self.T_ref);
         Motor { n_p, R_s: resistance * R_s, L_d, L_q, psi_M: magnet * psi_M }
+    }
+
+    /// Warns of temperatures that look like degrees Celsius.
+    pub fn warn(&self, inputs: &ThermalInputs, log: &mut Warnings<'_>) {
+        let mut check = |name, T| implausible::temperature(name, T, log);
+        check("thermal.T_ref", self.T_ref);
+        match self.mode {
+            ThermalMode::Constant => check("thermal.T_start", self.T_start),
+            ThermalMode::Network => {
+                check("thermal.T_start", self.T_start);
+                check("T_coolant", inputs.coolant);
+            }
+            ThermalMode::Imposed => {
+                let Temperatures { winding, stator, magnet, inverter } = inputs.imposed;
+                check("T_winding_imposed", winding);
+                check("T_stator_imposed", stator);
+                check("T_magnet_imposed", magnet);
+                check("T_inverter_imposed", inverter);
+            }
+        }
     }
 
     /// The heat of the parts with these `losses`, all of which reaches the coolant.
