@@ -551,6 +551,7 @@ fn a_lost_rotor_is_warned_of() {
         let found = warnings(&block.model);
         assert!(found.len() == 1 && found[0].0 == "lock_lost", "{found:?}");
         assert!(found[0].1.contains("rad/s") && found[0].1.contains("L_q = 0.006 H"), "{found:?}");
+        assert!(found[0].1.contains("i_a, i_b and i_c are not connected"), "{found:?}");
         assert_eq!(found[0].1.contains("R_s = 1.8 Ohm"), resistance, "{found:?}");
     }
     // An enormous current: the estimate turns too fast, and the controller restarts.

@@ -551,9 +551,15 @@ impl SensorlessController {
             } else {
                 String::new()
             };
+            let Phases { a, b, c } = self.inputs.i;
+            let none = if a.abs().max(b.abs()).max(c.abs()) > 0.0 {
+                ""
+            } else {
+                "the measured currents are 0 A, perhaps because i_a, i_b and i_c are not connected; "
+            };
             format!(
-                "lock_lost = {:.2}, 1 or more: the estimate does not fit the applied voltage, or the speed is not reached; \
-                 the rotor is not where theta_est = {} rad and speed_est = {} rad/s say, the load exceeds the torque, or the \
+                "lock_lost = {:.2}, 1 or more: {none}the estimate does not fit the applied voltage, or the speed is not reached; \
+                 the rotor is not where theta_est = {:.4} rad and speed_est = {:.4} rad/s say, the load exceeds the torque, or the \
                  controller's {resistive}L_d = {L_d} H, L_q = {L_q} H, psi_M = {psi_M} Wb do not fit the machine and its inverter",
                 out.lock_lost, out.theta_est, out.speed_est
             )

@@ -1,5 +1,5 @@
-//! Rules across the parameters of the plant: a flux map describes a machine, a network has heat capacities, and the machine
-//! works at the temperatures.
+//! Rules across the parameters of the plant: a flux map describes a machine, a network has heat capacities, a period contains its dead
+//! times, and the machine works at the temperatures.
 
 use crate::tables::{PARAMETERS, PlantParameters};
 use crate::thermal::{Temperatures, ThermalMode};
@@ -13,8 +13,18 @@ use fmu_core::Fault;
 /// Names the parameter, its value, and what is allowed.
 pub fn validate(parameters: &PlantParameters) -> Result<(), Fault> {
     check_map(parameters)?;
+    check_dead_time(parameters)?;
     check_switched(parameters)?;
     check_network(parameters)
+}
+
+/// Refuses a dead time that leaves no pulse: a leg switches twice in a period.
+fn check_dead_time(par: &PlantParameters) -> Result<(), Fault> {
+    if 2.0 * par.inverter.dead_time > par.inverter.T_pwm {
+        let allowed = format!("at most half of {}", PARAMETERS.tell(par, |p| &mut p.inverter.T_pwm));
+        return Err(PARAMETERS.fault(par, |p| &mut p.inverter.dead_time, allowed));
+    }
+    Ok(())
 }
 
 /// Refuses what the switched inverter does not model.
@@ -139,6 +149,18 @@ fn refused(par: &PlantParameters, (name, T): (&str, f64), alpha: Get, effect: &s
 mod tests {
     use super::*;
     use crate::flux_map::{self, D, FluxMap, Q};
+
+    #[test]
+    fn a_dead_time_longer_than_half_a_period_is_refused() {
+        let with = |dead_time| {
+            let mut parameters = PlantParameters::default();
+            parameters.inverter.dead_time = dead_time;
+            validate(&parameters).map_err(|fault| fault.message().to_owned())
+        };
+        assert_eq!(with(5e-5), Ok(()));
+        let expected = "inverter.dead_time = 2 s is not allowed: at most half of inverter.T_pwm = 0.0001 s";
+        assert_eq!(with(2.0).unwrap_err(), expected);
+    }
 
     #[expect(clippy::cast_precision_loss, reason = "a few intervals")]
     #[test]
