@@ -22,8 +22,8 @@ inputs = np.array(rows, dtype=[("time", float), ("speed_ref", float), ("tau_load
 losses = {"iron.G_e": 1.3e-4, "inverter.r_transistor": 0.08, "inverter.r_diode": 0.08, "inverter.E_sw": 5e-4}
 outputs = ["speed", "speed_est", "tau_e", "p_in", "p_mech", "p_loss", "efficiency"]
 with redirect_stdout(None):  # FMPy lists the inputs that keep their start values
-    run = simulate_fmu(f"{folder}/PmsmDrive.fmu", stop_time=1.5, output_interval=2e-3, input=inputs, output=outputs,
-                       start_values={f"plant.{name}": value for name, value in losses.items()})
+    run = simulate_fmu(f"{folder}/PmsmDrive.fmu", stop_time=1.5, step_size=1e-3, output_interval=2e-3, input=inputs,
+                       output=outputs, start_values={f"plant.{name}": value for name, value in losses.items()})
 
 t, rpm = run["time"], 30 / np.pi
 efficiency = np.where(run["efficiency"] > 0, 100 * run["efficiency"], np.nan)  # 0 where no power goes through
