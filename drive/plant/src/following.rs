@@ -6,8 +6,6 @@
 //! wrapped angle, or one that jumps once, counts little. During a steady acceleration, a step of Co-Simulation that begins with
 //! the speed at its beginning deviates by half of the change of the speed: a share of 1/n after n steps from rest.
 
-use crate::model::PmsmPlant;
-use crate::signals::PlantInputs;
 use drive_base::math::wrap;
 use fmu_core::log::Warnings;
 use serde::{Deserialize, Serialize};
@@ -52,16 +50,6 @@ impl Following {
                 )
             });
         }
-    }
-}
-
-impl PmsmPlant {
-    /// Counts a step of `h` (s) of Co-Simulation with an imposed shaft, at its beginning.
-    #[cold]
-    #[inline(never)]
-    pub(super) fn follow(&mut self, h: f64) {
-        let PlantInputs { speed_shaft, angle_shaft, .. } = self.inputs;
-        self.following.count(speed_shaft * h, angle_shaft - self.state.angle);
     }
 }
 

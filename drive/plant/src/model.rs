@@ -289,6 +289,14 @@ impl Model for PmsmPlant {
 }
 
 impl PmsmPlant {
+    /// Counts a step of `h` (s) of Co-Simulation with an imposed shaft, at its beginning.
+    #[cold]
+    #[inline(never)]
+    fn follow(&mut self, h: f64) {
+        let PlantInputs { speed_shaft, angle_shaft, .. } = self.inputs;
+        self.following.count(speed_shaft * h, angle_shaft - self.state.angle);
+    }
+
     /// Begins anew where it is, with the rotor at the mechanical `angle` (rad): the counters are 0, the machine goes on as it was.
     pub fn begin_here(&mut self, angle: f64) {
         self.state = State::new(&self.warm.motor, self.state.psi, self.state.speed, angle);
