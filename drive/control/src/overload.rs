@@ -14,34 +14,39 @@ use fmu_core::log::Warnings;
 use serde::{Deserialize, Serialize};
 
 /// Time in s of growth after which half of the reference suffices.
-const LONG: f64 = 1.0;
+const LONG: f32 = 1.0;
 /// Time in s after which the report is not repeated.
-const SAID: f64 = 0.5;
+const SAID: f32 = 0.5;
 /// Time in s without the limit after which it begins anew: in field weakening, the limit follows the speed and leaves single samples out.
-const BREAK: f64 = 5e-3;
+const BREAK: f32 = 5e-3;
 /// Time in s over which the error of the speed has one minimum.
-const SPAN: f64 = 0.5;
+const SPAN: f32 = 0.5;
+
+/// In single precision, which suffices here and takes half of the state.
+#[expect(clippy::cast_possible_truncation, reason = "rounds")]
+fn short(x: f64) -> f32 {
+    x as f32
+}
 
 /// What has been seen.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Overload {
-    /// Whether the limit acts, the time in s since it last did, the speed at its beginning, and whether that is below its reference.
+    /// Whether the limit acts, the speed at its beginning, and whether that is below its reference.
     acts: bool,
-    rest: f64,
     from: f64,
     below: bool,
     /// Maximum distance from that speed, and the time in s in which it has grown.
     farthest: f64,
-    time: f64,
-    /// Whether the speed has run away, and the time in s since then.
+    time: f32,
+    /// Whether the speed has run away, and the time in s since then, or before that the time since the limit last acted.
     is: bool,
-    since: f64,
-    /// The smallest error of the speed in the present span and in the last one, the time in s since its beginning, and the number of
-    /// spans without a change.
-    nearest: f64,
-    last: f64,
-    span: f64,
-    same: u32,
+    since: f32,
+    /// Number of spans in which the smallest error of the speed has not changed, that error in the present span and in the last one, and
+    /// the time in s since the beginning of the present one.
+    same: u8,
+    nearest: f32,
+    last: f32,
+    span: f32,
 }
 
 impl Overload {
@@ -53,8 +58,8 @@ impl Overload {
         if limited {
             self.at_limit(h, speed_ref, speeds);
         } else if self.acts {
-            self.rest += h;
-            if self.rest > BREAK {
+            self.since += short(h);
+            if self.is || self.since > BREAK {
                 *self = Self::default();
             }
         }
@@ -62,24 +67,26 @@ impl Overload {
 
     #[inline(never)]
     fn at_limit(&mut self, h: f64, speed_ref: f64, [before, speed]: [f64; 2]) {
-        self.rest = 0.0;
+        if !self.is {
+            self.since = 0.0;
+        }
         let (below, error) = (speed_ref > speed, (speed_ref - speed).abs());
         if !self.acts || below != self.below {
             (self.acts, self.from, self.below, self.farthest, self.time) = (true, before, below, 0.0, 0.0);
-            (self.nearest, self.last, self.span, self.same) = (error, f64::INFINITY, 0.0, 0);
+            (self.nearest, self.last, self.span, self.same) = (short(error), f32::INFINITY, 0.0, 0);
         }
-        (self.nearest, self.span) = (self.nearest.min(error), self.span + h);
+        (self.nearest, self.span) = (self.nearest.min(short(error)), self.span + short(h));
         if self.span >= SPAN {
-            let is_same = (self.nearest - self.last).abs() <= 0.002 * speed_ref.abs() + 0.01;
+            let is_same = (self.nearest - self.last).abs() <= short(0.002 * speed_ref.abs() + 0.01);
             self.same = if is_same { self.same.saturating_add(1) } else { 0 };
-            (self.nearest, self.last, self.span) = (error, self.nearest, 0.0);
+            (self.nearest, self.last, self.span) = (short(error), self.nearest, 0.0);
         }
         let (away, size) = (if below { self.from - speed } else { speed - self.from }, speed_ref.abs());
         if away > self.farthest {
-            (self.farthest, self.time) = (away, self.time + h);
+            (self.farthest, self.time) = (away, self.time + short(h));
         }
         if self.is {
-            self.since += h;
+            self.since += short(h);
         }
         self.is |= away > 1.2 * size + 10.0 && size > 10.0 || self.time >= LONG && away > 0.5 * size + 1.0;
     }
@@ -96,7 +103,7 @@ impl Overload {
 
     /// Whether it has just been found that the speed stays away from its reference `speed_ref` (rad/s).
     fn stays(&self, speed_ref: f64) -> bool {
-        !self.is && self.same == 2 && self.last > 0.02 * speed_ref.abs() + 0.5
+        !self.is && self.same == 2 && self.last > short(0.02 * speed_ref.abs() + 0.5)
     }
 
     /// Reports what has been found, with the speed (rad/s), its reference (rad/s) and the limits of the torque (N.m).
