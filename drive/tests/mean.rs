@@ -512,7 +512,9 @@ fn with_moved(index: Option<usize>, case: usize) -> Option<Vec<u64>> {
     if let Some(index) = index {
         match PmsmDriveMean::TABLE.entry(&mut block, index)? {
             (meta, Slot::Real(x)) => {
-                let moved = if *x == 0.0 { 0.3 } else { 0.8 * *x };
+                // A dead time is a small part of a PWM period.
+                let from_0 = if meta.description.starts_with("Dead time") { 1e-6 } else { 0.3 };
+                let moved = if *x == 0.0 { from_0 } else { 0.8 * *x };
                 // The trim settles elsewhere only without bandwidth.
                 let moved = if meta.description.contains("0: no trim") { 0.0 } else { moved };
                 *x = if meta.range.contains(moved) { moved } else { *x * 1.1 };
