@@ -20,7 +20,7 @@ use drive_control::battery::DcLimits;
 use drive_control::modes::SpeedRange;
 use drive_control::tables::ControllerParameters;
 use fmu_core::log::Warnings;
-use fmu_core::{Block, Causality, ContinuousTime, Description, Elapsed, Model, Slot, Step, Warns};
+use fmu_core::{Block, Causality, ContinuousTime, Description, Elapsed, Meta, Model, Slot, Step, Warns};
 use vehicle::{ENERGY, KWH, LOSSES, Vehicle};
 
 /// A drive with the same inputs and the same outputs.
@@ -451,6 +451,15 @@ fn link_of(case: usize, model: &mut PmsmDriveMean) {
     }
 }
 
+/// Another value of a parameter than `x`, in its range.
+fn another(meta: &Meta, x: f64) -> f64 {
+    // The trim settles elsewhere only without bandwidth; a dead time is a small part of a PWM period.
+    let from_0 = if meta.description.starts_with("Dead time") { 1e-6 } else { 0.3 };
+    let moved = if x == 0.0 { from_0 } else { 0.8 * x };
+    let moved = if meta.description.contains("0: no trim") { 0.0 } else { moved };
+    if meta.range.contains(moved) { moved } else { x * 1.1 }
+}
+
 /// All outputs as bits after a run with the parameter `index` changed, or `None` if the value is refused.
 fn with_moved(index: Option<usize>, case: usize) -> Option<Vec<u64>> {
     let (mut plant, mut controller) = traction();
@@ -511,14 +520,7 @@ fn with_moved(index: Option<usize>, case: usize) -> Option<Vec<u64>> {
     let index = index.filter(|_| block.model.drive.plant.flux_map == before);
     if let Some(index) = index {
         match PmsmDriveMean::TABLE.entry(&mut block, index)? {
-            (meta, Slot::Real(x)) => {
-                // A dead time is a small part of a PWM period.
-                let from_0 = if meta.description.starts_with("Dead time") { 1e-6 } else { 0.3 };
-                let moved = if *x == 0.0 { from_0 } else { 0.8 * *x };
-                // The trim settles elsewhere only without bandwidth.
-                let moved = if meta.description.contains("0: no trim") { 0.0 } else { moved };
-                *x = if meta.range.contains(moved) { moved } else { *x * 1.1 };
-            }
+            (meta, Slot::Real(x)) => *x = another(meta, *x),
             (_, Slot::Integer(x)) => assert!(x.set(x.get() + 1) || x.set(x.get() - 1)),
             (_, Slot::Boolean(x)) => *x = !*x,
             (_, Slot::Enumeration(x)) => assert!(x.set(x.get() + 1) || x.set(1) && x.get() != 2),
