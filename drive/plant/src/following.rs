@@ -2,15 +2,22 @@
 //!
 //! With `mechanics.imposed`, speed and angle of the shaft are inputs. An angle that is not connected, that is in degrees, electrical, reversed
 //! or behind a gear puts the rotor back or ahead in every step: the flux linkage of the stator stays where it is, and the currents
-//! and the torque of the machine are wrong. Of each step, this deviation counts at most as much as the turn by the speed, so that a
-//! wrapped angle, or one that jumps once, counts little. During a steady acceleration, a step of Co-Simulation that begins with
-//! the speed at its beginning deviates by half of the change of the speed: a share of 1/n after n steps from rest.
+//! and the torque of the machine are wrong.
+//!
+//! ```text
+//! turn = speed h          off = wrap(angle - angle expected from the last step) sign(turn), limited to +-|turn|
+//! reported: |sum of off| > 0.7 sum of |turn| > 0.7 rad, over the last one or two radians
+//! ```
+//!
+//! The limit makes an angle that is wrapped, or jumps once, count little. After n steps of a steady acceleration from rest, the angle
+//! is ahead by a share of 1/n, because each step continues with the speed at its beginning. Derived here; mechanical angles in rad,
+//! speed in rad/s, h in s.
 
 use drive_base::math::wrap;
 use fmu_core::log::Warnings;
 use serde::{Deserialize, Serialize};
 
-/// Turn of the shaft in rad before it is judged; twice as much fades to half.
+/// Minimum turn of the shaft in rad for a verdict. Both sums are halved at twice this turn, so that the last radians decide.
 const ENOUGH: f64 = 1.0;
 
 /// Share of the turn by which the angle may deviate.
@@ -94,5 +101,9 @@ mod tests {
         // Through zero.
         assert_eq!(first(|t| 50.0 * (40.0 * t).cos(), |angle| angle), None, "to and fro");
         assert!(first(|t| 50.0 * (40.0 * t).cos(), |_| 1.0).is_some(), "to and fro with a fixed angle");
+        // A vibration turns too little in one direction to be judged by it.
+        assert!(first(|t| 50.0 * (400.0 * t).cos(), |_| 1.0).is_some(), "a vibration with a fixed angle");
+        let jumps = |angle: f64| if angle > 50.0 { angle + 2.0 } else { angle };
+        assert_eq!(first(|_| 200.0, jumps), None, "an angle that jumps once");
     }
 }
