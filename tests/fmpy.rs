@@ -55,6 +55,12 @@ fn examples_of_drive_trains_and_flux_maps() {
     pytest("fmpy", "drive-train", &files, &[("FMU_COMMAND", command)]);
 }
 
+/// The schemas of both standards, against which FMPy validates.
+#[test]
+fn the_checker_and_the_schemas() {
+    pytest("fmpy", "schema", &["test_schema.py"], &[("FMU_COMMAND", Path::new(env!("CARGO_BIN_EXE_fmu")))]);
+}
+
 #[test]
 fn model_exchange_and_events() {
     pytest("fmpy", "exchange", &["test_model_exchange.py", "test_casadi.py"], &[]);

@@ -14,7 +14,7 @@ fn toolchain(program: &str) -> PathBuf {
     if path.is_file() { path } else { program.into() }
 }
 
-/// `fmu build` with these targets and this `PATH`.
+/// `fmu build` of a small FMU with these targets and this `PATH`.
 fn build(targets: &str, path: impl AsRef<OsStr>, environment: &[(&str, &str)]) -> Output {
     let mut command = Command::new(env!("CARGO_BIN_EXE_fmu"));
     for (name, _) in std::env::vars_os() {
@@ -24,7 +24,11 @@ fn build(targets: &str, path: impl AsRef<OsStr>, environment: &[(&str, &str)]) -
         }
     }
     command.env("RUSTC", toolchain("rustc")).env("CARGO", toolchain("cargo")).env("PATH", path);
-    command.args(["build", "PmsmPlant", "--target", targets]).envs(environment.iter().copied()).output().unwrap()
+    command
+        .args(["build", "--package", "own-fmu", "--target", targets])
+        .envs(environment.iter().copied())
+        .output()
+        .unwrap()
 }
 
 fn fails(targets: &str, path: &str, environment: &[(&str, &str)], parts: &[&str]) {
@@ -87,7 +91,7 @@ fn a_plain_build_names_its_requirements() {
     let [files, printed] = [output.stdout, output.stderr].map(|bytes| String::from_utf8(bytes).unwrap());
     assert!(output.status.success(), "{printed}");
     let platform = format!("{}-linux", std::env::consts::ARCH);
-    let start = format!("note: PmsmPlant for {platform} requires ");
+    let start = format!("note: RcCircuit for {platform} requires ");
     let note = printed.lines().find_map(|line| line.strip_prefix(&start));
     for file in files.lines() {
         let check =

@@ -116,7 +116,7 @@ fn seconds(name: &str, s: Option<f64>) -> Result<Option<Duration>, Error> {
 /// Runs the command. Returns whether no must is violated, or with `strict` whether every applicable check passes.
 ///
 /// # Errors
-/// A file is not an FMU, or an id does not exist.
+/// A file is not an FMU (the others are checked and reported all the same), or an id does not exist.
 pub fn run(args: &CheckArguments) -> Result<bool, Error> {
     if args.list {
         print!("{}", report::list());
@@ -155,9 +155,16 @@ pub fn run(args: &CheckArguments) -> Result<bool, Error> {
     let baseline = args.baseline.as_deref().map(Baseline::read).transpose()?;
     let began = std::time::Instant::now();
     let mut reports: Vec<Report> = Vec::new();
+    let mut unusable = Vec::new();
     for file in &args.files {
         let left = options.timeout.map(|all| all.saturating_sub(began.elapsed()));
-        let mut report = check::run(file, &Options { timeout: left, ..options.clone() })?;
+        let mut report = match check::run(file, &Options { timeout: left, ..options.clone() }) {
+            Ok(report) => report,
+            Err(cause) => {
+                unusable.push(cause.to_string());
+                continue;
+            }
+        };
         report.confidence = args.confidence;
         report.allow(&args.allow);
         if let Some(baseline) = &baseline {
@@ -166,15 +173,20 @@ pub fn run(args: &CheckArguments) -> Result<bool, Error> {
         reports.push(report);
     }
     match (args.format, reports.as_slice()) {
+        (_, []) => {}
         (Format::Text, reports) => {
             let text = report::texts(reports, args.verbose) + &news(baseline.as_ref(), reports);
             print!("{}", printable_lines(&text));
         }
-        (Format::Json, [report]) => println!("{}", report.json()?),
+        (Format::Json, [report]) if args.files.len() == 1 => println!("{}", report.json()?),
         (Format::Json, reports) => println!("{}", serde_json::to_string_pretty(reports)?),
         (Format::Html, reports) => print!("{}", report::html(reports)),
         (Format::Junit, reports) => print!("{}", formats::junit(reports)),
         (Format::Sarif, reports) => println!("{}", serde_json::to_string_pretty(&formats::sarif(reports))?),
+    }
+    // The other files are reported.
+    if !unusable.is_empty() {
+        return Err(Error(unusable.join("\n")));
     }
     if let Some(path) = &args.write_baseline {
         whole::write(path, Baseline::text(&reports).as_bytes()).map_err(|e| Error(e.to_string()))?;

@@ -61,6 +61,8 @@ pub struct ModelDescription {
     pub initial_unknowns: Vec<Unknown>,
     /// Event indicators of the model structure (FMI 3.0 only).
     pub event_indicators: Vec<Unknown>,
+    /// Clocked states of the model structure (FMI 3.0 only).
+    pub clocked_states: Vec<Unknown>,
     #[serde(skip)]
     pub(crate) names: Names,
 }

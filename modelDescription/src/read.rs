@@ -67,10 +67,8 @@ pub fn read_element(root: &Element) -> Result<ModelDescription, Error> {
         outputs: structure::unknowns(structure, version, "Outputs", "Output")?,
         derivatives: structure::unknowns(structure, version, "Derivatives", "ContinuousStateDerivative")?,
         initial_unknowns: structure::unknowns(structure, version, "InitialUnknowns", "InitialUnknown")?,
-        event_indicators: match version {
-            FmiVersion::V2 => Vec::new(),
-            FmiVersion::V3 => structure::unknowns(structure, version, "", "EventIndicator")?,
-        },
+        event_indicators: structure::unknowns(structure, version, "", "EventIndicator")?,
+        clocked_states: structure::unknowns(structure, version, "", "ClockedState")?,
         names: Names::default(),
     })
 }

@@ -1,11 +1,11 @@
-//! A small element tree: names, attributes, children. Neither standard uses text content, so it is not stored.
+//! A small element tree: names, attributes, children, and whether there is text.
 
 mod element;
 mod names;
 mod parse;
 mod print;
 
-pub use element::Element;
+pub use element::{Element, Text};
 pub(crate) use parse::parse;
 pub(crate) use print::print;
 
@@ -21,12 +21,12 @@ mod tests {
             .children([Element::new("leaf").with("x", ""), Element::new("branch").children([Element::new("leaf")])]);
         let printed = print(&tree);
         let mut back = parse(&printed).unwrap();
-        forget_lines(&mut back);
+        forget_layout(&mut back);
         assert_eq!(back, tree);
     }
 
-    fn forget_lines(element: &mut Element) {
-        element.line = 0;
-        element.children.iter_mut().for_each(forget_lines);
+    fn forget_layout(element: &mut Element) {
+        (element.line, element.text) = (0, Text::None);
+        element.children.iter_mut().for_each(forget_layout);
     }
 }

@@ -187,6 +187,25 @@ fn several_files_have_one_summary() {
     assert_eq!((html.matches("<h1>").count(), html.matches("<html").count()), (3, 1));
 }
 
+/// A file that is not an FMU hides nothing of the others.
+#[test]
+fn the_others_are_reported_beside_a_broken_file() {
+    let dir = tempfile::tempdir().unwrap();
+    let [empty, lost] = ["empty.fmu", "lost.fmu"].map(|name| dir.path().join(name));
+    std::fs::write(&empty, "").unwrap();
+    let one = archive(dir.path(), "one.fmu", two_faults);
+    let files = [&empty, &one, &lost].map(|path| path.to_str().unwrap());
+    let baseline = dir.path().join("baseline.toml");
+    let run = |more: &[&str]| fmu_check(&[&files[..], &["--only", STATIC], more].concat());
+    let (code, text, error) = run(&["--write-baseline", baseline.to_str().unwrap()]);
+    assert_eq!((code, baseline.exists()), (Some(2), false));
+    assert!(text.contains("S01    VIOLATED (must)"), "{text}");
+    assert!(error.contains("empty.fmu: not a ZIP archive") && error.contains("lost.fmu: "), "{error}");
+    let (code, json, _) = run(&["--format", "json"]);
+    let reports: Vec<serde_json::Value> = serde_json::from_str(&json).unwrap();
+    assert_eq!((code, reports.len()), (Some(2), 1));
+}
+
 /// A reason that many checks share is printed once.
 #[test]
 fn a_common_reason_has_one_line() {

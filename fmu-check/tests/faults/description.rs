@@ -68,6 +68,20 @@ fn faults_of_fmi_2() {
             (&["X01b", "X08"], "canGetAndSetFMUstate", "canGetAndSetFMUState"),
             (&["X01b"], "<Real start=\"0\"/>", "<Real start=\"0\" color=\"red\"/>"),
             (&["X01b"], "<DefaultExperiment startTime=\"0\" stopTime=\"10\" stepSize=\"0.01\"/>", "<Surprise/>"),
+            (&["X01b"], "\"structured\"", "\"tree\""),
+            (&["X01b"], "  <LogCategories>", "text <LogCategories>"),
+            (&["X01b"], "<Real start=\"0\"/>", "<Real start=\"0\">\n</Real>"),
+            (&["X01b"], "<Real start=\"0\"/>", "<Real start=\"0\"/><Real start=\"0\"/>"),
+            (&["X01b"], "<fmiModelDescription ", "<fmiModelDescription xmlns=\"urn:x\" "),
+            (&["X01b"], "<fmiModelDescription ", "<fmiModelDescription xmlns:x=\"urn:x\" x:y=\"1\" "),
+            (&["X01a", "X01b"], "<fmiModelDescription ", "<fmiModelDescription x:y=\"1\" "),
+            (
+                &[],
+                "<fmiModelDescription ",
+                "<fmiModelDescription xmlns:i=\"http://www.w3.org/2001/XMLSchema-instance\" i:schemaLocation=\"x\" ",
+            ),
+            (&["X01b"], "2026-01-02T03", "2026-02-30T03"),
+            (&["X01b"], "max=\"1000000\"", "max=\"3000000000\""),
             (&["X02a"], "fmiVersion=\"2.0\"", "fmiVersion=\"2.0.5\""),
             (&["X05"], "03:04:05Z", "03:04:05+00:00"),
             (&["X06"], " license=\"MIT\"", ""),
@@ -113,6 +127,10 @@ fn faults_of_fmi_2() {
                 "<Unknown index=\"5\"/><Unknown index=\"4\"/>",
             ),
             (&["S03a"], "index=\"4\" dependencies=\"\"", "index=\"4\" dependencies=\"99\""),
+            (&["S05"], "<Real start=\"0\"/>", "<Real derivative=\"99\" start=\"0\"/>"),
+            (&["S05"], "<Real start=\"0\"/>", "<Real derivative=\"3\" start=\"0\"/>"),
+            (&["S05"], "<Real start=\"0\"/>", "<Real derivative=\"5\" start=\"0\"/>"),
+            (&[], "<Real start=\"0\"/>", "<Real derivative=\"4\" start=\"0\"/>"),
             (&["S03k"], "index=\"4\" dependencies=\"\"", "index=\"4\" dependencies=\"5\""),
             (
                 &["S03b"],
@@ -157,6 +175,15 @@ fn faults_of_aliases_and_clocked_states() {
             (&["V15"], "clocks=\"19\" previous", "clocks=\"99\" previous"),
             (&["V15"], "clocks=\"19\" previous", "clocks=\"19 6\" previous"),
             (&["V15"], "clocks=\"19\" previous", "clocks=\"5\" previous"),
+            (&["V15", "S02a"], "clocks=\"19\" previous", "clocks=\"\" previous"),
+            // A tunable parameter on a clock, and a clock that is not discrete.
+            (
+                &[],
+                "<Clock",
+                "<Float64 name=\"p\" valueReference=\"20\" causality=\"parameter\" variability=\"tunable\" clocks=\"19\" start=\"0\"/><Clock",
+            ),
+            (&["V15", "S01"], TICK, "causality=\"output\" variability=\"constant\" intervalVariability=\"triggered\""),
+            (&["S03a"], "<ClockedState valueReference=\"5\"", "<ClockedState valueReference=\"5\" dependencies=\"99\""),
             (&["V16"], "intervalVariability=\"triggered\"", "intervalVariability=\"constant\""),
             (&["V16"], "intervalVariability=\"triggered\"", "intervalVariability=\"constant\" intervalDecimal=\"0\""),
             (&["V16"], "intervalVariability=\"triggered\"", "intervalVariability=\"triggered\" intervalDecimal=\"1\""),
@@ -239,7 +266,7 @@ fn faults_of_types_and_lists() {
     );
     let exchange = include_str!("exchange3.xml");
     let dir = tempfile::tempdir().unwrap();
-    let only = ["V18", "S01", "S02a", "S07", "X11"];
+    let only = ["V18", "S01", "S02a", "S07", "S08", "X11"];
     let of = |xml: &str| {
         let path = dir.path().join("x.fmu");
         write(&path, &[Entry::new("modelDescription.xml", xml.as_bytes()), Entry::new("sources/fmu.c", b"x")]);
@@ -247,12 +274,19 @@ fn faults_of_types_and_lists() {
         (violated(&report), listed(&report))
     };
     let derivative = "<ContinuousStateDerivative valueReference=\"4\" dependencies=\"1 2 3\"/>";
-    let faults: [(&[&str], &str, &str, &str); 8] = [
+    let faults: [(&[&str], &str, &str, &str); 10] = [
         (&[], exchange, "", ""),
         (&["S07"], exchange, derivative, &format!("{derivative}{derivative}")),
         (&["S07"], exchange, "<EventIndicator valueReference=\"8\"", "<EventIndicator valueReference=\"2\""),
         (&["S07"], exchange, "<EventIndicator valueReference=\"8\"", "<EventIndicator valueReference=\"7\""),
+        (&["S07"], exchange, "<EventIndicator valueReference=\"8\"", "<EventIndicator valueReference=\"99\""),
         (&["V18"], exchange, "start=\"1\"/>", "start=\"1\" reinit=\"true\"/>"),
+        (
+            &["S08"],
+            exchange,
+            "variability=\"continuous\" initial=\"calculated\" derivative",
+            "variability=\"discrete\" initial=\"calculated\" derivative",
+        ),
         (&[], include_str!("exchange2.xml"), "", ""),
         (
             &["S07"],

@@ -208,13 +208,13 @@ const DESCRIPTIONS: &[Edit] = &[
     ("CATIA-Systems/FMIKit-Simulink/issues/99", XML2, "encoding=\"UTF-8\"", "encoding=\"windows-1252\"", &["X01a"]),
     ("OpenModelica/OpenModelica/issues/12344", XML2, "name=\"high\"", "name=\"hi\"gh\"", &["X01a"]),
     ("CATIA-Systems/FMIKit-Simulink/issues/155", XML2, "A small FMU", "Temperature < 3 & up", &["X01a"]),
-    ("Hopsan/hopsan/issues/1846", XML2, "2026-01-02T03:04:05Z", "2019-05-10_16_10", &["X05"]),
+    ("Hopsan/hopsan/issues/1846", XML2, "2026-01-02T03:04:05Z", "2019-05-10_16_10", &["X01b", "X05"]),
     (
         "hyumo/qFMU/issues/27",
         XML3,
         "generationDateAndTime=\"2026-01-02T03:04:05Z\"",
         "generationDateAndTime=\"2023-10-09 20:45:22.102681\"",
-        &["X05"],
+        &["X01b", "X05"],
     ),
     (
         "modelon-community/fmi-library/issues/128",

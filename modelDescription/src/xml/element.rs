@@ -1,5 +1,17 @@
 //! An element: name, attributes, children.
 
+/// Text directly inside an element, outside its children.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord)]
+pub enum Text {
+    /// None, or comments only.
+    #[default]
+    None,
+    /// Only blanks and line breaks.
+    Blank,
+    /// Other characters.
+    Words,
+}
+
 /// An element of an XML document, as in the file.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Element {
@@ -11,6 +23,8 @@ pub struct Element {
     pub children: Vec<Element>,
     /// Line of the start tag, from 1; 0 for one that was not read.
     pub line: usize,
+    /// Whether it has text; neither standard uses it, so the text itself is not stored.
+    pub text: Text,
 }
 
 impl Element {

@@ -1,7 +1,7 @@
 //! Parses an element tree. Any input yields a tree or an error: no panic, no unbounded recursion, no entity expansion, no
 //! external file.
 
-use super::element::Element;
+use super::element::{Element, Text};
 use super::names::{is_legal, is_name};
 use crate::error::Error;
 use crate::limits;
@@ -38,6 +38,9 @@ pub(crate) fn parse(text: &str) -> Result<Element, Error> {
             Event::Eof => break,
             other => {
                 beside(&other, open.is_empty()).map_err(|e| wrong(&e))?;
+                if let Some(element) = open.last_mut() {
+                    element.text = element.text.max(content(&other));
+                }
                 continue;
             }
         };
@@ -79,6 +82,15 @@ fn place(element: Element, open: &mut [Element], root: &mut Option<Element>) {
     match open.last_mut() {
         Some(parent) => parent.children.push(element),
         None => *root = Some(element),
+    }
+}
+
+/// The text that this part of an element's content is.
+fn content(event: &Event<'_>) -> Text {
+    match event {
+        Event::Text(text) if text.xml10_content().trim().is_empty() => Text::Blank,
+        Event::Text(_) | Event::CData(_) | Event::GeneralRef(_) => Text::Words,
+        _ => Text::None,
     }
 }
 
@@ -176,6 +188,20 @@ mod tests {
             parse("\u{feff}<?xml version='1.0' standalone='no'?>\n<!-- -->\n<a\n  x='&#x41;&lt;'>\n <b/> text &gt; <![CDATA[<]]>\n</a>\n")
                 .unwrap();
         assert_eq!((tree.line, tree.get("x"), tree.children[0].line), (3, Some("A<"), 5));
+    }
+
+    #[test]
+    fn text_is_noticed() {
+        for (inside, text) in [
+            ("", Text::None),
+            ("<!-- x --><b>x</b>", Text::None),
+            ("\n<b/>\n", Text::Blank),
+            ("<b/>x\n", Text::Words),
+            ("&#65;", Text::Words),
+            ("<![CDATA[x]]>", Text::Words),
+        ] {
+            assert_eq!(parse(&format!("<a>{inside}</a>")).unwrap().text, text, "{inside}");
+        }
     }
 
     #[test]

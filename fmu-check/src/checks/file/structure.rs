@@ -14,6 +14,11 @@ use std::collections::BTreeSet;
 
 const CLAUSE: &str = "2.0.5, 2.2.8; 3.0.2, 2.4.8";
 
+const NO_DERIVATIVES: &str = "the list of state derivatives is empty";
+const INITIAL: &str = "initial unknown";
+const INDICATOR: &str = "event indicator";
+const CLOCKED: &str = "clocked state";
+
 #[rustfmt::skip]
 pub(crate) const CHECKS: &[Check] = &[
     Check { id: "S01", clause: CLAUSE, levels: Levels::MUST, run: Run::File(outputs),
@@ -44,9 +49,13 @@ pub(crate) const CHECKS: &[Check] = &[
         tried: "Changes one known at a time in Initialization Mode and reads the unknowns that do not name it.",
         fix: "Add the known to dependencies, or leave dependencies out, which means all." },
     Check { id: "S05", clause: CLAUSE, levels: Levels::MUST, run: Run::File(derivatives),
-        requirement: "A state derivative refers to its state with the attribute derivative.",
-        tried: "Follows the attribute derivative of every listed derivative.",
-        fix: "Let derivative refer to the state, by index in FMI 2.0, by value reference in FMI 3.0." },
+        requirement: "A state derivative refers to its state with the attribute derivative, and every attribute derivative to another floating-point \
+            variable.",
+        tried: "Follows the attribute derivative of every listed derivative and of every variable.",
+        fix: "Let derivative refer to the variable, by index in FMI 2.0, by value reference in FMI 3.0." },
+    Check { id: "S08", clause: CLAUSE, levels: Levels::SHOULD, run: Run::File(continuous),
+        requirement: "The states and state derivatives of Model Exchange are continuous variables.",
+        tried: "Reads variability of every listed derivative and of its state.", fix: "Write variability=\"continuous\", or leave it out." },
     Check { id: "S06", clause: "3.0.2, 2.4.8", levels: Levels(None, Some(Level::Must)), run: Run::File(clocked_states),
         requirement: "A clocked state is a discrete variable on a clock and refers to its previous value with the attribute previous; no two share one.",
         tried: "Follows the attribute previous of every clocked state.",
@@ -129,8 +138,13 @@ fn sorted(fmu: &FmuFile) -> Verdict {
 
 /// Every entry of the lists: the list, and line and name for a finding.
 fn entries(d: &ModelDescription) -> impl Iterator<Item = (&'static str, &Unknown, String)> {
-    let lists: [(_, &[Unknown]); 3] =
-        [("output", &d.outputs), ("derivative", &d.derivatives), ("initial unknown", &d.initial_unknowns)];
+    let lists: [(_, &[Unknown]); 5] = [
+        ("output", &d.outputs),
+        ("derivative", &d.derivatives),
+        (INITIAL, &d.initial_unknowns),
+        (INDICATOR, &d.event_indicators),
+        (CLOCKED, &d.clocked_states),
+    ];
     let all = lists.into_iter().flat_map(|(kind, unknowns)| unknowns.iter().map(move |u| (kind, u)));
     all.map(|(kind, u)| (kind, u, format!("line {}: {kind} {}", u.line, name(d, u.reference))))
 }
@@ -151,14 +165,14 @@ fn knowns(fmu: &FmuFile) -> Verdict {
     with_description(fmu, |d| {
         let states: BTreeSet<&str> = states_and_derivatives(d).iter().map(|v| v.name.as_str()).collect();
         let mut findings = Vec::new();
-        for (kind, unknown, at) in entries(d) {
+        for (kind, unknown, at) in entries(d).filter(|(kind, ..)| ![INDICATOR, CLOCKED].contains(kind)) {
             let dependencies = unknown.dependencies.as_deref().unwrap_or_default();
             for (i, &reference) in dependencies.iter().enumerate() {
                 if dependencies[..i].contains(&reference) {
                     findings.push(format!("{at}: the dependency {reference} occurs twice"));
                 }
                 let Some(v) = d.referenced(reference) else { continue };
-                if !is_known(d, v, kind == "initial unknown", &states) {
+                if !is_known(d, v, kind == INITIAL, &states) {
                     findings.push(format!("{at}: {} is not a known here ({}, {})", v.name, v.causality, v.variability));
                 }
             }
@@ -189,16 +203,30 @@ fn kinds(fmu: &FmuFile) -> Verdict {
             if words.len() != count {
                 findings.push(format!("{at}: {} kinds for {count} dependencies", words.len()));
             }
-            let bad = |w: &&String| kind == "initial unknown" && !["dependent", "constant"].contains(&w.as_str());
+            let bad = |w: &&String| kind == INITIAL && !["dependent", "constant"].contains(&w.as_str());
             findings.extend(words.iter().find(bad).map(|word| format!("{at}: the kind {word}")));
         }
         findings
     })
 }
 
-fn derivatives(fmu: &FmuFile) -> Verdict {
+fn continuous(fmu: &FmuFile) -> Verdict {
     if fmu.description.as_ref().is_ok_and(|d| d.derivatives.is_empty()) {
-        return Verdict::NotApplicable("the list of state derivatives is empty".into());
+        return Verdict::NotApplicable(NO_DERIVATIVES.into());
+    }
+    with_description(fmu, |d| {
+        let other = states_and_derivatives(d).into_iter().filter(|v| v.variability != Variability::Continuous);
+        other.map(|v| format!("line {}: {} is {}", v.line, v.name, v.variability)).collect()
+    })
+}
+
+fn derivatives(fmu: &FmuFile) -> Verdict {
+    if fmu
+        .description
+        .as_ref()
+        .is_ok_and(|d| d.derivatives.is_empty() && d.variables.iter().all(|v| v.derivative.is_none()))
+    {
+        return Verdict::NotApplicable("no variable is a derivative".into());
     }
     with_description(fmu, |d| {
         let bad = |u: &Unknown| {
@@ -208,6 +236,18 @@ fn derivatives(fmu: &FmuFile) -> Verdict {
                 format!("line {}: {} refers to no state that is local or an output", u.line, name(d, u.reference))
             })
         };
-        d.derivatives.iter().filter_map(bad).collect()
+        let lost = |v: &ModelVariable| {
+            let of = v.derivative?;
+            let fault = match d.referenced(of) {
+                None => format!("derivative={of}, which does not exist"),
+                Some(other) if other.name == v.name => "itself as the variable that it is the derivative of".into(),
+                Some(other) if !(other.base.is_float() && v.base.is_float()) => {
+                    format!("derivative={of}, but derivatives and their variables are floating-point")
+                }
+                Some(_) => return None,
+            };
+            Some(format!("line {}: {} has {fault}", v.line, v.name))
+        };
+        d.derivatives.iter().filter_map(bad).chain(d.variables.iter().filter_map(lost)).collect()
     })
 }

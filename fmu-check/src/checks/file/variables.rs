@@ -87,7 +87,8 @@ pub(crate) const CHECKS: &[Check] = &[
         requirement: "No type definition has the name of a variable.",
         tried: "Compares the names of types and variables.", fix: "Rename the type." },
     Check { id: "V15", clause: "3.0.2, 2.4.7.4", levels: Levels(None, Some(Level::Must)), run: Run::File(references_of_clocks),
-        requirement: "The attribute clocks names clocks and belongs to discrete variables, and previous names another discrete variable of the same type.",
+        requirement: "The attribute clocks names clocks and belongs to discrete or tunable variables, clocks are discrete, and previous names another \
+            discrete variable of the same type.",
         tried: "Follows both attributes of all variables.", fix: "Give the value references of clocks, and of the variable with the previous value." },
     Check { id: "V16", clause: "3.0.2, 2.4.4", levels: Levels(None, Some(Level::Must)), run: Run::File(intervals),
         requirement: "Periodic clocks, and no others, have an interval above 0 and no negative shift, and output clocks have no priority.",

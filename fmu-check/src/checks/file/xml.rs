@@ -9,7 +9,7 @@ use model_description::{Element, FmiVersion, Interface, ModelDescription};
 #[rustfmt::skip]
 pub(crate) const CHECKS: &[Check] = &[
     Check { id: "X01a", clause: "2.0.5, 2.2; 3.0.2, 2.4", levels: Levels::MUST, run: Run::File(well_formed),
-        requirement: "modelDescription.xml is well-formed XML in UTF-8 and declares UTF-8 in its first line.",
+        requirement: "modelDescription.xml is well-formed XML in UTF-8, declares UTF-8 in its first line, and declares every prefix.",
         tried: "Parses the file and reads its first line.", fix: "Begin with <?xml version=\"1.0\" encoding=\"UTF-8\"?> and write UTF-8." },
     Check { id: "X01m", clause: "hardening", levels: Levels::HARD, run: Run::File(no_mark),
         requirement: "modelDescription.xml does not start with a byte order mark, which some importers cannot read.",
@@ -87,6 +87,7 @@ fn well_formed(fmu: &FmuFile) -> Verdict {
         findings.push(format!("line 1: {declaration}?> does not declare encoding=\"UTF-8\""));
     }
     findings.extend(fmu.root().and_then(forbidden));
+    findings.extend(fmu.root().and_then(schema::undeclared));
     Verdict::of(findings)
 }
 

@@ -1,6 +1,7 @@
 //! Clocks, clocked variables, and lists of the model structure that only some variables fit (FMI 3.0.2, 2.4.4, 2.4.7.4, 2.4.8).
 
 use crate::check::Verdict;
+use crate::checks::file::shared::schema;
 use crate::checks::file::xml::with_description;
 use crate::encoding::attribute;
 use crate::fmu_file::FmuFile;
@@ -28,7 +29,13 @@ pub(crate) fn references(fmu: &FmuFile) -> Verdict {
         let mut found = Vec::new();
         let discrete =
             |v: &Element| v.get("variability").map_or(!v.name.starts_with("Float"), |word| word == "discrete");
+        if v.name == "Clock" && !discrete(v) {
+            found.push("is a clock and not discrete".into());
+        }
         if let Some(list) = v.get("clocks") {
+            if list.trim().is_empty() {
+                found.push("has an empty list of clocks".into());
+            }
             for reference in list.split_whitespace() {
                 match all.get(reference) {
                     None => found.push(format!("belongs to the clock {reference}, which does not exist")),
@@ -40,8 +47,8 @@ pub(crate) fn references(fmu: &FmuFile) -> Verdict {
                     Some(_) => {}
                 }
             }
-            if !discrete(v) && v.name != "Clock" {
-                found.push("is clocked and not discrete".into());
+            if !discrete(v) && v.name != "Clock" && v.get("variability") != Some("tunable") {
+                found.push("is clocked, and neither discrete nor tunable".into());
             }
         }
         if let Some(reference) = v.get("previous") {
@@ -181,16 +188,17 @@ pub(crate) fn lists(fmu: &FmuFile) -> Verdict {
     }
     for indicator in structure.all("EventIndicator") {
         let reference = indicator.get("valueReference").unwrap_or_default();
-        let Some(v) = variables(root).iter().find(|v| v.get("valueReference") == Some(reference)) else { continue };
+        let line = indicator.line;
+        let Some(v) = variables(root).iter().find(|v| v.get("valueReference") == Some(reference)) else {
+            found.push(format!("line {line}: the event indicator {reference} does not exist"));
+            continue;
+        };
         let continuous = v.name.starts_with("Float") && v.get("variability").is_none_or(|word| word == "continuous");
         let parameter =
             v.get("causality").is_some_and(|c| c.ends_with("arameter") || c == "input" || c == "independent");
         if !continuous || parameter {
             let name = v.get("name").unwrap_or_default();
-            found.push(format!(
-                "line {}: the event indicator {name} is not a continuous output or local variable",
-                indicator.line
-            ));
+            found.push(format!("line {line}: the event indicator {name} is not a continuous output or local variable"));
         }
     }
     Verdict::of(found)
@@ -206,10 +214,7 @@ pub(crate) fn build_description(fmu: &FmuFile) -> Verdict {
             Ok(root) => root,
             Err(cause) => return Verdict::Violated(vec![format!("{FILE}: {cause}")]),
         };
-    let mut found = Vec::new();
-    if root.name != "fmiBuildDescription" {
-        found.push(format!("{FILE}: the element is {}, expected fmiBuildDescription", root.name));
-    }
+    let mut found: Vec<_> = schema::deviations_of_build(&root).into_iter().map(|f| format!("{FILE}: {f}")).collect();
     // FMI 2.0 borrowed the file from FMI 3.0.
     let (own, version) = (fmu.root().and_then(|r| r.get("fmiVersion")), root.get("fmiVersion"));
     if version.is_none() || (fmu.version == FmiVersion::V3 && version != own) {
@@ -219,12 +224,8 @@ pub(crate) fn build_description(fmu: &FmuFile) -> Verdict {
             attribute(own)
         ));
     }
-    let configurations: Vec<&Element> = root.all("BuildConfiguration").collect();
-    if configurations.is_empty() {
-        found.push(format!("{FILE}: there is no BuildConfiguration"));
-    }
     let mut fallback = HashMap::new();
-    for configuration in configurations {
+    for configuration in root.all("BuildConfiguration") {
         let model = configuration.get("modelIdentifier").unwrap_or_default();
         let line = configuration.line;
         let known = fmu.description.as_ref().is_ok_and(|d| {

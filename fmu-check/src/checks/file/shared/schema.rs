@@ -1,7 +1,11 @@
-//! Walks the elements of modelDescription.xml and terminalsAndIcons.xml along the rules of the standard.
+//! Walks the elements of modelDescription.xml, terminalsAndIcons.xml and buildDescription.xml along the rules of the standard.
 
-use crate::checks::file::shared::schema_rules::{Rule, TERMINALS, V2, V3, expand};
-use model_description::{Element, FmiVersion, parse_number};
+use crate::checks::file::shared::schema_rules::{BUILD, Rule, TERMINALS, V2, V3, expand, words};
+use model_description::{Element, FmiVersion, Text, parse_number};
+use std::str::FromStr;
+
+/// The namespace of the attributes that XML Schema itself allows in every element.
+const INSTANCE: &str = "http://www.w3.org/2001/XMLSchema-instance";
 
 /// Every deviation, with its line.
 pub(crate) fn deviations(root: &Element, version: FmiVersion) -> Vec<String> {
@@ -17,13 +21,50 @@ pub(crate) fn deviations_of_terminals(root: &Element) -> Vec<String> {
     along(root, "fmiTerminalsAndIcons", TERMINALS)
 }
 
+/// Deviations of buildDescription.xml from its schema, which both standards share.
+pub(crate) fn deviations_of_build(root: &Element) -> Vec<String> {
+    along(root, "fmiBuildDescription", BUILD)
+}
+
+/// A prefix that is used in an element or attribute and that neither it nor an element around it declares.
+pub(crate) fn undeclared(root: &Element) -> Option<String> {
+    fn within<'a>(element: &'a Element, declared: &mut Vec<&'a str>) -> Option<String> {
+        let before = declared.len();
+        let names = || element.attributes.iter().map(|(name, _)| name.as_str());
+        declared.extend(names().filter_map(|name| name.strip_prefix("xmlns:")));
+        let used = std::iter::once(element.name.as_str()).chain(names()).filter_map(|name| name.split_once(':'));
+        let own = used.map(|(prefix, _)| prefix).find(|p| !["xml", "xmlns"].contains(p) && !declared.contains(p));
+        let own = own.map(|prefix| format!("line {}: the prefix {prefix} is not declared", element.line));
+        let found = own.or_else(|| element.children.iter().find_map(|child| within(child, declared)));
+        declared.truncate(before);
+        found
+    }
+    within(root, &mut Vec::new())
+}
+
 fn along(root: &Element, name: &str, rules: &'static [Rule]) -> Vec<String> {
-    let mut findings = Vec::new();
     if root.name != name {
         return vec![format!("line {}: the root element is <{}>", root.line, root.name)];
     }
-    walk(root, "", rules, &mut findings);
-    findings
+    let of_schema = root.attributes.iter().filter(|(_, value)| value == INSTANCE);
+    let instance = of_schema.filter_map(|(name, _)| name.strip_prefix("xmlns:")).collect();
+    let mut walk = Walk { rules, instance, findings: Vec::new() };
+    walk.element(root, "");
+    walk.findings
+}
+
+/// Attributes of the interfaces of FMI 3.0 that the standard does not define, although its schema allows any.
+pub(crate) fn unknown_capabilities(root: &Element) -> Vec<String> {
+    let mut walk = Walk { rules: V3, instance: Vec::new(), findings: Vec::new() };
+    for element in
+        root.children.iter().filter(|e| ["ModelExchange", "CoSimulation", "ScheduledExecution"].contains(&&*e.name))
+    {
+        if let Some(rule) = find(V3, &root.name, &element.name) {
+            // Names with a prefix belong to other standards.
+            walk.unknown(element, &attributes_of(rule), |name| name.contains(':'));
+        }
+    }
+    walk.findings
 }
 
 fn find(rules: &'static [Rule], parent: &str, name: &str) -> Option<&'static Rule> {
@@ -40,135 +81,261 @@ fn find(rules: &'static [Rule], parent: &str, name: &str) -> Option<&'static Rul
     rules.iter().find(|r| r.element == long).or_else(|| rules.iter().find(|r| r.element == generic))
 }
 
-fn walk(element: &Element, parent: &str, rules: &'static [Rule], findings: &mut Vec<String>) {
-    let Some(rule) = find(rules, parent, &element.name) else { return };
-    attributes(element, rule, findings);
-    if rule.children == "*" {
-        return;
-    }
-    children(element, rule, findings);
-    for child in &element.children {
-        walk(child, &element.name, rules, findings);
-    }
-}
-
-/// Attributes of the interfaces of FMI 3.0 that the standard does not define, although its schema allows any.
-pub(crate) fn unknown_capabilities(root: &Element) -> Vec<String> {
-    let mut findings = Vec::new();
-    for element in
-        root.children.iter().filter(|e| ["ModelExchange", "CoSimulation", "ScheduledExecution"].contains(&&*e.name))
-    {
-        if let Some(rule) = find(V3, &root.name, &element.name) {
-            unknown(element, &words(rule), &mut findings);
-        }
-    }
-    findings
-}
-
-fn words(rule: &Rule) -> Vec<&'static str> {
+/// The attributes of a rule with their forms.
+fn attributes_of(rule: &Rule) -> Vec<&'static str> {
     let words = rule.attributes.split_whitespace();
     words.flat_map(|w| if w.starts_with('@') { expand(w).split_whitespace().collect() } else { vec![w] }).collect()
 }
 
-fn attributes(element: &Element, rule: &Rule, findings: &mut Vec<String>) {
-    let all = words(rule);
-    let at = format!("line {}: <{}>", element.line, element.name);
-    for word in &all {
-        let (name, form) = word.split_once(':').unwrap_or((word, "*"));
-        match element.get(name) {
-            None if form.ends_with('!') => findings.push(format!("{at} has no attribute {name}")),
-            Some(value) if !fits(value, form.trim_end_matches('!')) => {
-                findings.push(format!("{at} has {name}={value:?}, which is not {}", say(form.trim_end_matches('!'))));
+struct Walk<'a> {
+    rules: &'static [Rule],
+    /// Prefixes of [`INSTANCE`].
+    instance: Vec<&'a str>,
+    findings: Vec<String>,
+}
+
+impl Walk<'_> {
+    fn element(&mut self, element: &Element, parent: &str) {
+        let Some(rule) = find(self.rules, parent, &element.name) else { return };
+        self.attributes(element, rule);
+        if rule.children == "*" {
+            return;
+        }
+        self.text(element, rule);
+        if rule.children == "*?" {
+            if let Some(second) = element.children.get(1) {
+                self.findings.push(format!(
+                    "line {}: <{}> is a second element in <{}>, which has one at most",
+                    second.line, second.name, element.name
+                ));
             }
+            return;
+        }
+        self.children(element, rule);
+        for child in &element.children {
+            self.element(child, &element.name);
+        }
+    }
+
+    fn attributes(&mut self, element: &Element, rule: &Rule) {
+        let all = attributes_of(rule);
+        let at = format!("line {}: <{}>", element.line, element.name);
+        for word in &all {
+            let (name, form) = word.split_once(':').unwrap_or((word, "s"));
+            let (form, required) = form.strip_suffix('!').map_or((form, false), |form| (form, true));
+            let form = form.replace('N', &own_type(&element.name));
+            match element.get(name) {
+                None if required => self.findings.push(format!("{at} has no attribute {name}")),
+                Some(value) if !fits(value, &form) => {
+                    self.findings.push(format!("{at} has {name}={value:?}, which is not {}", say(&form)));
+                }
+                _ => {}
+            }
+        }
+        if let Some(space) = element.get("xmlns").filter(|space| !space.is_empty()) {
+            self.findings.push(format!("{at} is in the namespace {space:?}; the elements of FMI are in none"));
+        }
+        if !all.contains(&"*") {
+            let instance = std::mem::take(&mut self.instance);
+            self.unknown(element, &all, |name| {
+                let (prefix, local) = name.split_once(':').unwrap_or(("", name));
+                let schema = ["type", "nil", "schemaLocation", "noNamespaceSchemaLocation"].contains(&local);
+                prefix == "xmlns" || instance.contains(&prefix) && schema
+            });
+            self.instance = instance;
+        }
+    }
+
+    fn unknown(&mut self, element: &Element, all: &[&str], foreign: impl Fn(&str) -> bool) {
+        for (name, _) in &element.attributes {
+            let known = name == "xmlns" || foreign(name) || all.iter().any(|w| w.split(':').next() == Some(name));
+            if !known {
+                let at = format!("line {}: <{}>", element.line, element.name);
+                self.findings.push(format!("{at} has an attribute {name}, which the standard does not define"));
+            }
+        }
+    }
+
+    /// Text where the standard has none. Blanks are allowed between children only.
+    fn text(&mut self, element: &Element, rule: &Rule) {
+        let (at, empty) = (format!("line {}: <{}>", element.line, element.name), rule.children.is_empty());
+        match element.text {
+            Text::Words => self.findings.push(format!("{at} contains text")),
+            Text::Blank if empty && element.children.is_empty() => self.findings.push(format!(
+                "{at} contains blanks or a line break, and the schema allows no content: write <{} .../>",
+                element.name
+            )),
             _ => {}
         }
     }
-    if !all.contains(&"*") {
-        unknown(element, &all, findings);
+
+    /// Children that are unknown, missing, repeated, or not in the order of the standard.
+    fn children(&mut self, element: &Element, rule: &Rule) {
+        let free = rule.children.starts_with('~');
+        let places: Vec<&str> = rule.children.trim_start_matches('~').split_whitespace().collect();
+        let names = |place: &'static str| place.trim_end_matches(['?', '!', '+']).split('|');
+        let place_of = |name: &str| places.iter().position(|p| names(p).any(|n| n == name));
+        let at = |e: &Element| format!("line {}: <{}>", e.line, e.name);
+        let mut last = 0;
+        let mut seen = vec![0_usize; places.len()];
+        for child in &element.children {
+            match place_of(&child.name) {
+                None => self.findings.push(format!("{} is not allowed in <{}>", at(child), element.name)),
+                Some(place) => {
+                    if place < last && !free {
+                        let order = rule.children.replace(['?', '!', '+'], "").replace('|', " or ");
+                        self.findings.push(format!(
+                            "{} comes too late: the order in <{}> is {order}",
+                            at(child),
+                            element.name
+                        ));
+                    }
+                    last = last.max(place);
+                    seen[place] += 1;
+                }
+            }
+        }
+        for (place, count) in places.iter().zip(seen) {
+            let name = names(place).collect::<Vec<_>>().join("> or <");
+            if count == 0 && place.ends_with(['!', '+']) {
+                self.findings.push(format!("{} has no <{name}>", at(element)));
+            }
+            if count > 1 && place.ends_with(['?', '!']) {
+                self.findings.push(format!("{} has {count} of <{name}>; one is allowed", at(element)));
+            }
+        }
+        if free && element.children.is_empty() {
+            self.findings.push(format!("{} is empty", at(element)));
+        }
     }
 }
 
-fn unknown(element: &Element, all: &[&str], findings: &mut Vec<String>) {
-    for (name, _) in &element.attributes {
-        // Names with a prefix belong to other standards.
-        let known = name.contains(':') || name == "xmlns" || all.iter().any(|w| w.split(':').next() == Some(name));
-        if !known {
-            let at = format!("line {}: <{}>", element.line, element.name);
-            findings.push(format!("{at} has an attribute {name}, which the standard does not define"));
-        }
-    }
+/// The form of a value of a variable or type with this name.
+fn own_type(element: &str) -> String {
+    let name = element.trim_end_matches("Type");
+    if name.starts_with("Float") { "d".into() } else { name.replace("UInt", "u").replace("Int", "i") }
+}
+
+fn is<T: FromStr>(text: &str) -> bool {
+    text.parse::<T>().is_ok()
 }
 
 fn fits(value: &str, form: &str) -> bool {
-    let trimmed = value.trim();
+    if let Some(one) = form.strip_prefix('*') {
+        return value.split_whitespace().all(|word| fits(word, one));
+    }
+    // The words of the schema keep their blanks.
+    if let Some(kind) = form.strip_prefix('=') {
+        return words(kind).contains(&value);
+    }
+    let value = value.trim();
     match form {
-        "b" => ["true", "false", "0", "1"].contains(&trimmed),
-        "i" => trimmed.parse::<i128>().is_ok(),
-        "u" => trimmed.parse::<u64>().is_ok(),
-        "d" => parse_number(trimmed).is_some(),
-        "l" => trimmed.split_whitespace().all(|w| w.parse::<u32>().is_ok()),
-        "c" => {
-            trimmed.split_whitespace().filter(|w| w.parse::<u8>().is_ok()).count() == 3
-                && trimmed.split_whitespace().count() == 3
-        }
-        "w" => {
-            trimmed.split_whitespace().all(|w| ["dependent", "constant", "fixed", "tunable", "discrete"].contains(&w))
-        }
+        "b" => ["true", "false", "0", "1"].contains(&value),
+        "i8" => is::<i8>(value),
+        "i16" => is::<i16>(value),
+        "i32" => is::<i32>(value),
+        "i64" => is::<i64>(value),
+        "u8" => is::<u8>(value),
+        "u16" => is::<u16>(value),
+        "u32" => is::<u32>(value),
+        "u64" => is::<u64>(value),
+        "n" => !value.is_empty() && value.bytes().all(|c| c.is_ascii_digit()),
+        "d" => parse_number(value).is_some(),
+        "t" => is_date_and_time(value),
+        "x" => value.len().is_multiple_of(2) && value.bytes().all(|c| c.is_ascii_hexdigit()),
+        "c" => value.split_whitespace().count() == 3 && value.split_whitespace().all(is::<u8>),
         _ => true,
     }
 }
 
-fn say(form: &str) -> &'static str {
+fn say(form: &str) -> String {
+    if let Some(one) = form.strip_prefix('*') {
+        return format!("a list: each {}", say(one));
+    }
+    if let Some(kind) = form.strip_prefix('=') {
+        return format!("one of {}", words(kind).join(", "));
+    }
     match form {
-        "b" => "true or false",
-        "i" => "an integer",
-        "u" => "an unsigned integer",
-        "d" => "a number",
-        "l" => "a list of unsigned integers",
-        "c" => "a color, three numbers from 0 to 255",
-        "w" => "a list of dependent, constant, fixed, tunable, discrete",
-        _ => "of the right form",
+        "b" => "true or false".into(),
+        "n" => "an integer from 0 on".into(),
+        "d" => "a number".into(),
+        "t" => "a date and time, such as 2026-01-02T03:04:05Z".into(),
+        "x" => "hexadecimal, two digits for each byte".into(),
+        "c" => "a color, three numbers from 0 to 255".into(),
+        _ => match form.split_at_checked(1) {
+            Some(("i", bits)) => format!("an integer of {bits} bits"),
+            Some(("u", bits)) => format!("an unsigned integer of {bits} bits"),
+            _ => "of the right form".into(),
+        },
     }
 }
 
-/// Children that are unknown, missing, repeated, or not in the order of the standard.
-fn children(element: &Element, rule: &Rule, findings: &mut Vec<String>) {
-    let free = rule.children.starts_with('~');
-    let places: Vec<&str> = rule.children.trim_start_matches('~').split_whitespace().collect();
-    let place_of =
-        |name: &str| places.iter().position(|p| p.trim_end_matches(['?', '!']).split('|').any(|n| n == name));
-    let at = |e: &Element| format!("line {}: <{}>", e.line, e.name);
-    let mut last = 0;
-    let mut seen = vec![0_usize; places.len()];
-    for child in &element.children {
-        match place_of(&child.name) {
-            None if child.name.contains(':') => {}
-            None => findings.push(format!("{} is not allowed in <{}>", at(child), element.name)),
-            Some(place) => {
-                if place < last && !free {
-                    findings.push(format!(
-                        "{} comes too late: the order in <{}> is {}",
-                        at(child),
-                        element.name,
-                        rule.children
-                    ));
-                }
-                last = last.max(place);
-                seen[place] += 1;
-            }
+/// Whether this is `xs:dateTime`: a date of the calendar and a time, with a fraction and an offset if any.
+fn is_date_and_time(text: &str) -> bool {
+    let Some((date, time)) = text.split_once('T') else { return false };
+    let number = |text: &str, digits: usize| {
+        (text.len() == digits && text.bytes().all(|c| c.is_ascii_digit())).then(|| text.parse::<u32>().ok()).flatten()
+    };
+    let parts: Vec<&str> = date.trim_start_matches('-').split('-').collect();
+    let &[year, month, day] = parts.as_slice() else { return false };
+    let long = year.len() > 4 && !year.starts_with('0');
+    let (Some(y), Some(month), Some(day)) =
+        (number(year, if long { year.len() } else { 4 }), number(month, 2), number(day, 2))
+    else {
+        return false;
+    };
+    let leap = y.is_multiple_of(4) && (!y.is_multiple_of(100) || y.is_multiple_of(400));
+    let days = match month {
+        2 => 28 + u32::from(leap),
+        4 | 6 | 9 | 11 => 30,
+        1..=12 => 31,
+        _ => 0,
+    };
+    let (time, offset) = match time.find(['Z', '+', '-']) {
+        Some(at) => time.split_at(at),
+        None => (time, "Z"),
+    };
+    let clock = |text: &str| {
+        let (hours, minutes) = text.split_once(':')?;
+        Some((number(hours, 2)?, number(minutes, 2).filter(|m| *m < 60)?))
+    };
+    let offset = offset == "Z" || clock(&offset[1..]).is_some_and(|(h, m)| h < 14 || (h, m) == (14, 0));
+    let Some((clocked, seconds)) = time.rsplit_once(':') else { return false };
+    let (whole, fraction) = seconds.split_once('.').unwrap_or((seconds, "0"));
+    let Some(((h, m), s)) = clock(clocked).zip(number(whole, 2)) else { return false };
+    let ends = (h, m, s) == (24, 0, 0) && fraction.bytes().all(|c| c == b'0');
+    let in_day = h < 24 && s < 60 && !fraction.is_empty() && fraction.bytes().all(|c| c.is_ascii_digit());
+    y > 0 && (1..=days).contains(&day) && offset && (in_day || ends)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn dates_are_those_of_the_calendar() {
+        for good in [
+            "2026-02-28T23:59:59Z",
+            "2024-02-29T00:00:00",
+            "2026-01-01T24:00:00Z",
+            "-0001-03-31T00:00:00.5+14:00",
+            "12026-12-01T00:00:00-01:30",
+        ] {
+            assert!(is_date_and_time(good), "{good}");
+        }
+        let bad = "2026-02-30T00:00:00Z 2023-02-29T00:00:00Z 2026-2-28T00:00:00Z 02026-02-28T00:00:00Z 0000-01-01T00:00:00Z \
+            2026-02-28T00:00:60Z 2026-02-28T24:00:01Z 2026-02-28T00:00:00z 2026-02-28T00:00:00+14:01 2026-02-28T00:00:00.Z \
+            2026-02-28 00:00:00 2026-02-28T00:00Z 2026-13-01T00:00:00Z 2026-01-01T00:60:00Z +2026-01-01T00:00:00Z";
+        for bad in bad.split(' ').chain(["", "T", "2026-02-28T00:00:00+", "2026-02-28T:"]) {
+            assert!(!is_date_and_time(bad), "{bad}");
         }
     }
-    for (place, count) in places.iter().zip(seen) {
-        let name = place.trim_end_matches(['?', '!']);
-        if count == 0 && (place.ends_with('!') || name.contains('|')) {
-            findings.push(format!("{} has no <{}>", at(element), name.replace('|', "> or <")));
-        }
-        // Two of the same kind; FMI 2.0 allows one interface of each kind.
-        if count > 1 && place.ends_with('?') {
-            findings.push(format!("{} has {count} <{name}>", at(element)));
-        }
-    }
-    if free && element.children.is_empty() {
-        findings.push(format!("{} is empty", at(element)));
+
+    #[test]
+    fn a_prefix_is_declared_around_its_use() {
+        let of = |text: &str| undeclared(&Element::parse(text).unwrap());
+        assert_eq!(of("<a xml:lang='en' xmlns:p='x'><p:b p:c='1'/></a>"), None);
+        assert_eq!(of("<a>\n<b xmlns:p='x'><p:c/></b>\n<p:d/></a>").unwrap(), "line 3: the prefix p is not declared");
+        assert_eq!(of("<a q:b='1'/>").unwrap(), "line 1: the prefix q is not declared");
     }
 }
