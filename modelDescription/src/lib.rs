@@ -36,4 +36,4 @@ pub use variable::{
 };
 pub use version::{FmiVersion, UnknownVersion};
 pub use write::{Generation, fits, write, write_terminals};
-pub use xml::{Element, Text};
+pub use xml::{Element, TextContent};

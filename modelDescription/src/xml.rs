@@ -5,7 +5,7 @@ mod names;
 mod parse;
 mod print;
 
-pub use element::{Element, Text};
+pub use element::{Element, TextContent};
 pub(crate) use parse::parse;
 pub(crate) use print::print;
 
@@ -26,7 +26,7 @@ mod tests {
     }
 
     fn forget_layout(element: &mut Element) {
-        (element.line, element.text) = (0, Text::None);
+        (element.line, element.text) = (0, TextContent::None);
         element.children.iter_mut().for_each(forget_layout);
     }
 }

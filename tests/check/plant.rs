@@ -42,7 +42,7 @@ fn faults_of_fmi_3() {
             "causality=\"input\" variability=\"discrete\"",
             "causality=\"input\" variability=\"discrete\" intermediateUpdate=\"true\"",
         ),
-        (&["V14"], "start=\"325\"", "start=\"3,25\""),
+        (&["X01b", "V14"], "start=\"325\"", "start=\"3,25\""),
         (&["V13"], "start=\"325\"", "start=\"325 326\""),
         // The first output, replaced by an input.
         (&["S01"], &output, "<Output valueReference=\"1\""),

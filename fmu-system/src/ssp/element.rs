@@ -25,9 +25,13 @@ pub(super) fn required(e: &Element, name: &str) -> Result<String, String> {
     e.get(name).map(str::to_owned).ok_or_else(|| at(e, format!("<{}> has no attribute {name}", e.name)))
 }
 
-/// A truth value of XML.
-pub(super) fn is_true(text: &str) -> bool {
-    matches!(text.trim(), "true" | "1")
+/// A truth value of XML, false if it is not given.
+pub(super) fn is_true(e: &Element, name: &str) -> Result<bool, String> {
+    match e.get(name).map(str::trim) {
+        Some("true" | "1") => Ok(true),
+        None | Some("false" | "0") => Ok(false),
+        Some(other) => Err(at(e, format!("{name}={other:?} is not true or false"))),
+    }
 }
 
 /// Definitions of a file for its elements: units (SSP 1.0, 4.3) and enumerations.

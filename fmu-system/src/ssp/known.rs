@@ -1,5 +1,5 @@
-//! Allowed content of SSP files (schemas of SSP 1.0 and 2.0); everything else is reported in a note, so that nothing is ignored
-//! silently.
+//! Allowed content of SSP files (schemas of SSP 1.0 and 2.0); everything else is reported in a note, and what occurs twice is refused,
+//! so that nothing is ignored silently.
 
 use super::element::{TYPES, at, local};
 use model_description::Element;
@@ -63,13 +63,47 @@ const TYPE: (&str, &str) = (
     "Value Item",
 );
 
+/// Elements that may occur once in their parent, as a type may.
+const ONCE: [&str; 13] = [
+    "Enumerations",
+    "Units",
+    "DefaultExperiment",
+    "Connectors",
+    "ParameterBindings",
+    "Elements",
+    "Connections",
+    "SignalDictionaries",
+    "ParameterValues",
+    "ParameterMapping",
+    "ParameterSet",
+    "Parameters",
+    "BaseUnit",
+];
+
+/// The first child that occurs a second time, although SSP has one.
+fn twice(e: &Element) -> Option<&Element> {
+    let mut seen = Vec::new();
+    e.children.iter().find(|child| {
+        let name = local(child);
+        let kind = if TYPES.contains(&name) { "type" } else { name };
+        let single =
+            kind == "type" || ONCE.contains(&kind) || (kind == "System" && local(e) == "SystemStructureDescription");
+        let again = single && seen.contains(&kind);
+        seen.push(kind);
+        again
+    })
+}
+
 /// Content of a file that is not read: one note per kind.
-pub(super) fn notes(root: &Element) -> Vec<String> {
+///
+/// # Errors
+/// The line of an element that occurs twice.
+pub(super) fn notes(root: &Element) -> Result<Vec<String>, String> {
     let mut notes = Vec::new();
     if let Some(version) = root.get("version").filter(|version| !["1.0", "2.0"].contains(version)) {
         notes.push(at(root, format!("version={version:?} is read as SSP 2.0")));
     }
-    walk(root, &mut notes);
+    walk(root, &mut notes)?;
     // One of a kind, with its first line.
     let kind = |note: &String| note.split_once(": ").map_or(String::new(), |(_, what)| what.to_owned());
     let mut seen: Vec<String> = Vec::new();
@@ -79,20 +113,26 @@ pub(super) fn notes(root: &Element) -> Vec<String> {
         seen.push(kind);
         is_new
     });
-    notes
+    Ok(notes)
 }
 
-fn walk(e: &Element, notes: &mut Vec<String>) {
+fn walk(e: &Element, notes: &mut Vec<String>) -> Result<(), String> {
     let name = local(e);
     let known =
         KNOWN.iter().find(|(known, ..)| *known == name).map(|(_, attributes, children)| (*attributes, *children));
-    let Some((attributes, children)) = known.or_else(|| TYPES.contains(&name).then_some(TYPE)) else { return };
+    let Some((attributes, children)) = known.or_else(|| TYPES.contains(&name).then_some(TYPE)) else { return Ok(()) };
     let has = |list: &str, name: &str| list.split_whitespace().any(|one| one == name);
     for (attribute, _) in &e.attributes {
         let namespaced = attribute.contains(':') || attribute == "xmlns";
         if !namespaced && !has(attributes, attribute) && !INFORMATION.contains(&attribute.as_str()) {
             notes.push(at(e, format!("<{name}> of SSP has no attribute {attribute}: it is ignored")));
         }
+    }
+    if let Some(second) = twice(e) {
+        return Err(at(
+            second,
+            format!("<{}> is the second one in <{}>: remove it, or join both", local(second), e.name),
+        ));
     }
     for child in &e.children {
         match local(child) {
@@ -109,11 +149,12 @@ fn walk(e: &Element, notes: &mut Vec<String>) {
                     || (has(children, "TYPES") && TYPES.contains(&other))
                     || (has(children, "TRANSFORMATIONS") && has(TRANSFORMATIONS, other)) =>
             {
-                walk(child, notes);
+                walk(child, notes)?;
             }
             other => notes.push(at(child, format!("<{name}> of SSP has no element <{other}>: it is ignored"))),
         }
     }
+    Ok(())
 }
 
 #[cfg(test)]
@@ -122,7 +163,7 @@ mod tests {
 
     #[test]
     fn nothing_is_ignored_silently() {
-        let of = |text: &str| notes(&Element::parse(text).unwrap());
+        let of = |text: &str| notes(&Element::parse(text).unwrap()).unwrap();
         assert_eq!(
             of("<s:System name='a' id='i' xmlns:s='s'><s:ElementGeometry x1='0'/><s:Connections>\n\
                 <s:Connection startConnector='a' endConnector='b' supressUnitConversion='true'/>\n\
@@ -143,6 +184,29 @@ mod tests {
                 "line 1: <Real> of SSP has no attribute unti: it is ignored"
             ]
         );
+    }
+
+    #[test]
+    fn a_second_one_is_refused() {
+        let of = |text: &str| notes(&Element::parse(text).unwrap());
+        let inside = |text: &str| {
+            of(&format!("<SystemStructureDescription><System>{text}</System></SystemStructureDescription>"))
+        };
+        assert_eq!(
+            inside("<Elements><System/><System/></Elements><Connections><Connection/><Connection/></Connections>"),
+            Ok(vec![])
+        );
+        assert_eq!(
+            inside("<Connections/><Elements/>\n<Connections/>"),
+            Err("line 2: <Connections> is the second one in <System>: remove it, or join both".into())
+        );
+        let connector = "<Connectors><Connector><Real/><Dimension/><Dimension/>\n<Integer/></Connector></Connectors>";
+        assert_eq!(
+            inside(connector),
+            Err("line 2: <Integer> is the second one in <Connector>: remove it, or join both".into())
+        );
+        let root = of("<SystemStructureDescription><System/>\n<System/></SystemStructureDescription>");
+        assert!(root.unwrap_err().starts_with("line 2: <System> is the second one in <SystemStructureDescription>"));
     }
 
     #[test]

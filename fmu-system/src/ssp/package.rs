@@ -89,7 +89,8 @@ impl Package<'_> {
         };
         let wrong = |cause: String| Error::Invalid(format!("{file}: {cause}"));
         let root = Element::parse(&text).map_err(|e| wrong(e.to_string()))?;
-        self.notes.extend(known::notes(&root).into_iter().map(|note| format!("{file}: {note}")));
+        let notes = known::notes(&root).map_err(wrong)?;
+        self.notes.extend(notes.into_iter().map(|note| format!("{file}: {note}")));
         let content = read(&root).map_err(wrong)?;
         Ok((file, content))
     }

@@ -25,7 +25,7 @@ pub fn read(root: &Element) -> Result<Vec<MappingEntry>, String> {
     }
     let mut entries: Vec<MappingEntry> = Vec::new();
     for e in root.children.iter().filter(|e| local(e) == "MappingEntry") {
-        let hop = Hop { no_conversion: suppresses(e), transformation: transformation(e)?, unit: None };
+        let hop = Hop { no_conversion: suppresses(e)?, transformation: transformation(e)?, unit: None };
         let entry = MappingEntry { source: required(e, "source")?, target: required(e, "target")?, hop, line: e.line };
         if entries.iter().any(|other| other.target == entry.target) {
             return Err(at(e, format!("target={:?} is already mapped: remove one of the entries", entry.target)));
@@ -36,8 +36,11 @@ pub fn read(root: &Element) -> Result<Vec<MappingEntry>, String> {
 }
 
 /// Whether a connection or an entry passes numbers on without conversion of units.
-pub(super) fn suppresses(e: &Element) -> bool {
-    e.get("suppressUnitConversion").is_some_and(is_true)
+///
+/// # Errors
+/// The line and its error.
+pub(super) fn suppresses(e: &Element) -> Result<bool, String> {
+    is_true(e, "suppressUnitConversion")
 }
 
 /// The transformation of a connection or an entry.

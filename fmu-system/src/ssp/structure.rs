@@ -64,7 +64,7 @@ impl Structure {
                 .map(|(e, text)| read(text).map_err(|w| at(e, w)))
                 .transpose()
         };
-        let mut notes = known::notes(&root);
+        let mut notes = known::notes(&root)?;
         let mut reader =
             Reader { of: Definitions::read(&root)?, folder: String::new(), files, notes: &mut notes, depth: 0 };
         let level = reader.level(system, String::new())?;
@@ -185,7 +185,8 @@ impl Reader<'_> {
         let text = (self.files)(&file).map_err(|cause| at(e, cause))?;
         let root = Element::parse(&text).map_err(|e| inside(e.to_string()))?;
         let of = Definitions::read(&root).map_err(inside)?;
-        self.notes.extend(known::notes(&root).into_iter().map(|note| format!("{file}: {note}")));
+        let notes = known::notes(&root).map_err(inside)?;
+        self.notes.extend(notes.into_iter().map(|note| format!("{file}: {note}")));
         let path = format!("{path}{}.", required(e, "name")?);
         // Values of the component replace the system's.
         let more = self.bindings(e, &path, false)?;
@@ -207,7 +208,8 @@ impl Reader<'_> {
         let inside = |cause: String| at(e, format!("{file}: {cause}"));
         let text = (self.files)(&file).map_err(|cause| at(e, cause))?;
         let root = Element::parse(&text).map_err(|e| inside(e.to_string()))?;
-        self.notes.extend(known::notes(&root).into_iter().map(|note| format!("{file}: {note}")));
+        let notes = known::notes(&root).map_err(inside)?;
+        self.notes.extend(notes.into_iter().map(|note| format!("{file}: {note}")));
         entries(&root).map_err(inside)
     }
 
@@ -331,7 +333,7 @@ fn connection(e: &Element) -> Result<Connection, String> {
         let remedy = "SSP does not say whether it counts from 0 or 1: name the element, as in m[1,2]";
         return Err(at(e, format!("{name} is not supported, and {remedy}")));
     }
-    let hop = Hop { unit: None, no_conversion: ssm::suppresses(e), transformation: ssm::transformation(e)? };
+    let hop = Hop { unit: None, no_conversion: ssm::suppresses(e)?, transformation: ssm::transformation(e)? };
     Ok(Connection {
         start: end("startElement", "startConnector")?,
         end: end("endElement", "endConnector")?,
@@ -417,6 +419,11 @@ mod tests {
                 ),
                 "line 3: source=\"1\" is already in the table",
             ),
+            (
+                system("<Connections><Connection startConnector='a' endConnector='b' suppressUnitConversion='True'/></Connections>"),
+                "line 2: suppressUnitConversion=\"True\" is not true or false",
+            ),
+            (system("<Connections/>\n<Connections/>"), "line 3: <Connections> is the second one in <System>"),
             (
                 system(
                     "<ParameterBindings><ParameterBinding source='a'><ParameterMapping/></ParameterBinding></ParameterBindings>",

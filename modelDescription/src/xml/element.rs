@@ -2,7 +2,7 @@
 
 /// Text directly inside an element, outside its children.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord)]
-pub enum Text {
+pub enum TextContent {
     /// None, or comments only.
     #[default]
     None,
@@ -24,7 +24,7 @@ pub struct Element {
     /// Line of the start tag, from 1; 0 for one that was not read.
     pub line: usize,
     /// Whether it has text; neither standard uses it, so the text itself is not stored.
-    pub text: Text,
+    pub text: TextContent,
 }
 
 impl Element {

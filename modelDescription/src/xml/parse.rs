@@ -1,7 +1,7 @@
 //! Parses an element tree. Any input yields a tree or an error: no panic, no unbounded recursion, no entity expansion, no
 //! external file.
 
-use super::element::{Element, Text};
+use super::element::{Element, TextContent};
 use super::names::{is_legal, is_name};
 use crate::error::Error;
 use crate::limits;
@@ -86,11 +86,11 @@ fn place(element: Element, open: &mut [Element], root: &mut Option<Element>) {
 }
 
 /// The text that this part of an element's content is.
-fn content(event: &Event<'_>) -> Text {
+fn content(event: &Event<'_>) -> TextContent {
     match event {
-        Event::Text(text) if text.xml10_content().trim().is_empty() => Text::Blank,
-        Event::Text(_) | Event::CData(_) | Event::GeneralRef(_) => Text::Words,
-        _ => Text::None,
+        Event::Text(text) if text.xml10_content().trim().is_empty() => TextContent::Blank,
+        Event::Text(_) | Event::CData(_) | Event::GeneralRef(_) => TextContent::Words,
+        _ => TextContent::None,
     }
 }
 
@@ -193,12 +193,12 @@ mod tests {
     #[test]
     fn text_is_noticed() {
         for (inside, text) in [
-            ("", Text::None),
-            ("<!-- x --><b>x</b>", Text::None),
-            ("\n<b/>\n", Text::Blank),
-            ("<b/>x\n", Text::Words),
-            ("&#65;", Text::Words),
-            ("<![CDATA[x]]>", Text::Words),
+            ("", TextContent::None),
+            ("<!-- x --><b>x</b>", TextContent::None),
+            ("\n<b/>\n", TextContent::Blank),
+            ("<b/>x\n", TextContent::Words),
+            ("&#65;", TextContent::Words),
+            ("<![CDATA[x]]>", TextContent::Words),
         ] {
             assert_eq!(parse(&format!("<a>{inside}</a>")).unwrap().text, text, "{inside}");
         }

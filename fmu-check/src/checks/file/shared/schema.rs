@@ -1,7 +1,7 @@
 //! Walks the elements of modelDescription.xml, terminalsAndIcons.xml and buildDescription.xml along the rules of the standard.
 
 use crate::checks::file::shared::schema_rules::{BUILD, Rule, TERMINALS, V2, V3, expand, words};
-use model_description::{Element, FmiVersion, Text, parse_number};
+use model_description::{Element, FmiVersion, TextContent, parse_number};
 use std::str::FromStr;
 
 /// The namespace of the attributes that XML Schema itself allows in every element.
@@ -160,8 +160,8 @@ impl Walk<'_> {
     fn text(&mut self, element: &Element, rule: &Rule) {
         let (at, empty) = (format!("line {}: <{}>", element.line, element.name), rule.children.is_empty());
         match element.text {
-            Text::Words => self.findings.push(format!("{at} contains text")),
-            Text::Blank if empty && element.children.is_empty() => self.findings.push(format!(
+            TextContent::Words => self.findings.push(format!("{at} contains text")),
+            TextContent::Blank if empty && element.children.is_empty() => self.findings.push(format!(
                 "{at} contains blanks or a line break, and the schema allows no content: write <{} .../>",
                 element.name
             )),
