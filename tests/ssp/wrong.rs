@@ -45,9 +45,8 @@ fn a_wrong_structure_is_told_with_file_line_and_remedy() {
     for (base, cause) in
         [("rad=\"1\" s=\"-1\" factor=\"0.1047\"", ""), ("m=\"1\"", "the source is in rpm = m, the target in rad/s")]
     {
-        let units =
-            format!("</ssd:System><ssd:Units><ssc:Unit name=\"rpm\"><ssc:BaseUnit {base}/></ssc:Unit></ssd:Units>");
-        let (_defined, path) = changed(&path, "SystemStructure.ssd", "</ssd:System>", &units);
+        let units = format!("<ssd:Units><ssc:Unit name=\"rpm\"><ssc:BaseUnit {base}/></ssc:Unit>");
+        let (_defined, path) = changed(&path, "SystemStructure.ssd", "<ssd:Units>", &units);
         if cause.is_empty() {
             done(&["simulate", &path, "--stop", "0.001"]);
         } else {

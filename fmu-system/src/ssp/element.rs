@@ -78,6 +78,11 @@ impl Definitions {
     }
 }
 
+/// Whether this element of a connector names a clock that the connector is on; a clock without a name is a type.
+pub(super) fn is_on_clock(e: &Element) -> bool {
+    local(e) == "Clock" && e.get("name").is_some()
+}
+
 /// Elements that give the type of a connector, a value or an entry of a dictionary.
 pub(super) const TYPES: [&str; 17] = [
     "Real",

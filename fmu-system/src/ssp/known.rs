@@ -1,7 +1,7 @@
 //! Allowed content of SSP files (schemas of SSP 1.0 and 2.0); everything else is reported in a note, and what occurs twice is refused,
 //! so that nothing is ignored silently.
 
-use super::element::{TYPES, at, local};
+use super::element::{TYPES, at, is_on_clock, local};
 use model_description::Element;
 
 /// Without effect on a run: graphics, and information for people.
@@ -85,7 +85,7 @@ fn twice(e: &Element) -> Option<&Element> {
     let mut seen = Vec::new();
     e.children.iter().find(|child| {
         let name = local(child);
-        let kind = if TYPES.contains(&name) { "type" } else { name };
+        let kind = if TYPES.contains(&name) && !is_on_clock(child) { "type" } else { name };
         let single =
             kind == "type" || ONCE.contains(&kind) || (kind == "System" && local(e) == "SystemStructureDescription");
         let again = single && seen.contains(&kind);
@@ -131,7 +131,7 @@ fn walk(e: &Element, notes: &mut Vec<String>) -> Result<(), String> {
     if let Some(second) = twice(e) {
         return Err(at(
             second,
-            format!("<{}> is the second one in <{}>: remove it, or join both", local(second), e.name),
+            format!("<{}> is the second one in <{}>: remove it, or join both", local(second), local(e)),
         ));
     }
     for child in &e.children {
@@ -200,6 +200,8 @@ mod tests {
             inside("<Connections/><Elements/>\n<Connections/>"),
             Err("line 2: <Connections> is the second one in <System>: remove it, or join both".into())
         );
+        let clocked = "<Connectors><Connector><Real/><Clock name='a'/><Clock name='b'/></Connector></Connectors>";
+        assert_eq!(inside(clocked), Ok(vec![]));
         let connector = "<Connectors><Connector><Real/><Dimension/><Dimension/>\n<Integer/></Connector></Connectors>";
         assert_eq!(
             inside(connector),

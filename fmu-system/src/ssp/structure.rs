@@ -3,7 +3,7 @@
 
 use super::FMU_TYPE;
 pub use super::component::{Binding, Component, Connection, ConnectionEnd, Connector, Contents};
-use super::element::{Definitions, TYPES, at, child, list, local, required};
+use super::element::{Definitions, TYPES, at, child, is_on_clock, list, local, required};
 use super::flat::{Flat, Level, Reach, Reference, flat};
 pub use super::path::{Hop, StatedUnit};
 use super::{known, ssm, ssv};
@@ -302,9 +302,7 @@ fn entries(root: &Element) -> Result<Vec<Connector>, String> {
 
 /// A connector, or an entry of a dictionary.
 fn typed(e: &Element, of: &Definitions, kind: String) -> Result<Connector, String> {
-    // A clock with a name is one that the connector is on.
-    let on = |c: &&Element| local(c) == "Clock" && c.get("name").is_some();
-    let base = e.children.iter().find(|c| TYPES.contains(&local(c)) && !on(c));
+    let base = e.children.iter().find(|c| TYPES.contains(&local(c)) && !is_on_clock(c));
     let extent = |d: &Element| {
         let number = |text: &str| text.parse().map_err(|_| at(d, format!("size={text:?} is not a size")));
         d.get("size").map(number).transpose()
@@ -316,7 +314,7 @@ fn typed(e: &Element, of: &Definitions, kind: String) -> Result<Connector, Strin
         unit: base.and_then(|base| of.unit(base)),
         items: base.map(|base| of.items(base)).unwrap_or_default(),
         ticks: base.filter(|base| local(base) == "Clock").and_then(|c| c.get("intervalVariability")).map(str::to_owned),
-        clocks: e.children.iter().filter(on).filter_map(|c| c.get("name")).map(str::to_owned).collect(),
+        clocks: e.children.iter().filter(|c| is_on_clock(c)).filter_map(|c| c.get("name")).map(str::to_owned).collect(),
         extents: e.children.iter().filter(|c| local(c) == "Dimension").map(extent).collect::<Result<_, _>>()?,
         line: e.line,
     })
