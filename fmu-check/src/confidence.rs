@@ -17,7 +17,8 @@ pub enum Confidence {
 }
 
 /// Checks whose findings rest on a measurement, an approximation, or the usual meaning of a name.
-const LIKELY: [&str; 12] = ["V09c", "V09d", "X01s", "B11", "B07a", "B08p", "F01l", "T09s", "T13", "D01", "D02", "E19"];
+const LIKELY: [&str; 13] =
+    ["V09c", "V09d", "X01s", "B11", "B07a", "B07l", "B08p", "F01l", "T09s", "T13", "D01", "D02", "E19"];
 /// Checks of rules of thumb.
 const HINTS: [&str; 3] = ["B12", "T03", "V19"];
 

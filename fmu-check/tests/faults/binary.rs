@@ -153,12 +153,18 @@ const INVENTED: &[(&str, &[&str])] = &[
     ("G_L3r", &["G-L3a"]),
     ("V12s", &["V12"]),
     ("L10y", &["L10"]),
-    ("B07s", &["B07a"]),
+    ("B07s", &["B07a", "B07l"]),
+    // A state that moves only if it was read after the last step.
+    ("T14", &["T03", "T14"]),
+    // A stop time without a tolerance for rounding.
+    ("L12r", &["L12r"]),
+    // A history of all steps, freed with the instance.
+    ("B07l", &["B07l"]),
     ("B08e", &["B08"]),
 ];
-const INVENTED_CHECKS: [&str; 24] = [
+const INVENTED_CHECKS: [&str; 27] = [
     "G15", "G10", "G04", "G16", "G03b", "G01b", "G06", "L06", "L07", "T06b", "T01a", "T03", "F01b", "F01a", "F04a",
-    "G-L4", "B07a", "B08", "G-L2a", "G-L3a", "V12", "L10", "T01c", "L04a",
+    "G-L4", "B07a", "B07l", "L12r", "T14", "B08", "G-L2a", "G-L3a", "V12", "L10", "T01c", "L04a",
 ];
 
 /// State that stays altered or is left behind: each case is found by this check.

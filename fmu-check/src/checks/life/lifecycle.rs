@@ -79,6 +79,10 @@ pub(crate) const CHECKS: &[Check] = &[
     Check { id: "L12", clause: "2.0.5, 2.1.6; 3.0.2, 2.3.2", levels: Levels::MUST, run: Run::Probe(past_stop_time),
         requirement: "A step beyond the stop time returns Error.",
         tried: "Steps to the stop time, then beyond it.", fix: "Compare t + h with stopTime, with a small tolerance for rounding." },
+    Check { id: "L12r", clause: "hardening", levels: Levels::HARD, run: Run::Probe(rounded_stop_time),
+        requirement: "An importer that accumulates the time, t = t + h, reaches the stop time, although the last step ends later by a rounding error.",
+        tried: "Adds up steps until their sum exceeds their product, which is the stop time.",
+        fix: "Compare t + h with stopTime, with a small tolerance for rounding." },
 ];
 
 fn minimal_run(session: &Session) -> Result<(), NotDetermined> {
@@ -433,6 +437,36 @@ fn past_stop_time(session: &Session) -> Result<(), NotDetermined> {
     let status = instance.step_at(start + 4.0 * h, h)?;
     session.require(!status.is_ok(), || {
         format!("stopTime={}: DoStep(t={}, h={h}) returned {status}", start + 4.0 * h, start + 4.0 * h)
+    });
+    Ok(())
+}
+fn rounded_stop_time(session: &Session) -> Result<(), NotDetermined> {
+    let (h, start) = (session.h(), session.start());
+    let mut sum = start;
+    let exceeding = (1..=1000_u32).find_map(|n| {
+        sum += h;
+        let stop = start + f64::from(n) * h;
+        (n > 1 && sum > stop).then_some((n, stop))
+    });
+    let Some((n, stop)) = exceeding else {
+        return session.not_applicable("no sum of steps exceeds their product");
+    };
+    let instance = session.fresh()?;
+    instance.experiment(start, Some(stop));
+    instance.initialize()?;
+    for _ in 1..n {
+        instance.steps(1, h)?;
+    }
+    let t = instance.time.get();
+    let last = instance.step_at(t, h)?;
+    if instance.over.get() {
+        return Err(NotDetermined(format!("{ENDED} before the stop time")));
+    }
+    session.require(last.is_ok(), || {
+        format!(
+            "stopTime={stop}: DoStep(t={t}, h={h}), step {n}, ends {:.1e} s later and returned {last}",
+            t + h - stop
+        )
     });
     Ok(())
 }

@@ -34,6 +34,11 @@ pub(crate) const CHECKS: &[Check] = &[
         requirement: "Creating and freeing instances leaks no memory.",
         tried: "Creates, runs, reads and frees some thousand instances and measures memory.",
         fix: "Free in FreeInstance what Instantiate allocated; a sanitizer finds it." },
+    Check { id: "B07l", clause: "hardening", levels: Levels::HARD, run: Run::Probe(grows),
+        requirement: "An instance needs no more memory the longer it runs.",
+        tried: "Makes up to 9000 steps within the default experiment, reads the outputs after each, and measures memory after the first third and \
+            at the end.",
+        fix: "Free what a step or a getter allocates, and keep no history that grows with time." },
     Check { id: "B07b", clause: "hardening", levels: Levels::HARD, run: Run::Probe(reloads),
         requirement: "The binary can be loaded and unloaded repeatedly and does not stay loaded.",
         tried: "Loads and unloads 20 times.", fix: "End threads and unregister handlers when the library is unloaded." },
@@ -221,11 +226,24 @@ fn memory() -> Option<[u64; 2]> {
 const LEFT: u64 = 300;
 /// Growth in bytes per saved state that does not count as a leak; the checker itself stores nothing per state.
 pub(crate) const LEFT_BY_STATE: u64 = 50;
+/// Number of steps before and during a measurement.
+const STEPS: [u32; 2] = [3000, 6000];
+/// Growth in bytes per step that does not count as a leak.
+const LEFT_BY_STEP: u64 = 20;
 /// Total bytes that are not a leak: pages that the allocator keeps.
 const MINIMUM: u64 = 300_000;
 
 /// Maximum number of variables that each instance reads: more of them leave time for few instances.
 const READ: usize = 1000;
+
+/// The same for each step.
+const READ_BY_STEP: usize = 20;
+
+/// Bytes of memory more than `before`.
+fn growth(before: Option<[u64; 2]>) -> u64 {
+    let pairs = memory().unwrap_or_default().into_iter().zip(before.unwrap_or_default());
+    pairs.map(|(after, before)| after.saturating_sub(before)).max().unwrap_or(0)
+}
 
 /// Repeats an action and measures the growth of memory.
 pub(crate) fn leak(
@@ -251,11 +269,9 @@ pub(crate) fn leak(
         })
     };
     rounds(200)?;
-    let before = memory().unwrap_or_default();
+    let before = memory();
     let n = rounds(3000)?;
-    let growth =
-        memory().unwrap_or_default().iter().zip(before).map(|(after, before)| after.saturating_sub(before)).max();
-    let growth = growth.unwrap_or(0);
+    let growth = growth(before);
     session.require(growth < (left * n).max(MINIMUM), || format!("{n} {what} leaked {} kB{why}", growth / 1000));
     session.note(format!("{} kB more after {n} {what}", growth / 1000));
     Ok(())
@@ -283,6 +299,51 @@ fn leaks(session: &Session) -> Result<(), NotDetermined> {
         let _ = (instance.snapshot(&watched)?, texts(&instance)?);
         instance.free()
     })
+}
+
+/// Steps of one instance within its default experiment, beyond which models diverge. The first third fills buffers that have an end.
+fn grows(session: &Session) -> Result<(), NotDetermined> {
+    if memory().is_none() {
+        return Err(NotDetermined("this system does not report the memory of a process".into()));
+    }
+    let instance = session.stepping()?;
+    let stop = session.description.default_experiment.stop.unwrap_or(f64::INFINITY);
+    let span = (stop - session.start()) / f64::from(STEPS[0] + STEPS[1]);
+    let shorter = session.flag("canHandleVariableCommunicationStepSize") && span > 0.0;
+    let h = if shorter { session.h().min(span) } else { session.h() };
+    let mut watched = session.watched();
+    watched.truncate(READ_BY_STEP);
+    let round = |most: u32| {
+        let began = Instant::now();
+        session.record_calls(&format!("up to {most} steps"), || {
+            for k in 0..most {
+                let ends = instance.time.get() + h > stop + 0.5 * h;
+                if ends || instance.steps(1, h).is_err() {
+                    return Ok(k);
+                }
+                let _ = (instance.snapshot(&watched)?, texts(&instance)?);
+                let _ = take_events();
+                if session.half_time_used() || began.elapsed() > Duration::from_millis(400) {
+                    return Ok(k + 1);
+                }
+            }
+            Ok(most)
+        })
+    };
+    let first = round(STEPS[0])?;
+    let before = memory();
+    let n = round(STEPS[1])?;
+    if n < 300 {
+        let why =
+            format!("{first} and then {n} steps until the default experiment or 0.4 s were over: too few for memory");
+        return session.not_applicable(why);
+    }
+    let growth = growth(before);
+    session.require(growth < (LEFT_BY_STEP * u64::from(n)).max(MINIMUM), || {
+        format!("memory grew by {} kB in {n} steps, after {first} steps had been made", growth / 1000)
+    });
+    session.note(format!("{} kB more after {n} steps", growth / 1000));
+    Ok(())
 }
 
 fn reloads(session: &Session) -> Result<(), NotDetermined> {

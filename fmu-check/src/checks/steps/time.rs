@@ -84,6 +84,10 @@ pub(crate) const CHECKS: &[Check] = &[
     Check { id: "T12s", clause: "hardening", levels: Levels::HARD, run: Run::Probe(no_step_after),
         requirement: "No step succeeds after the FMU has ended the simulation.",
         tried: "Steps on after the end.", fix: "Return Error until the FMU is reset." },
+    Check { id: "T14", clause: "hardening", levels: Levels::HARD, run: Run::Probe(unread),
+        requirement: "Reading variables does not change the run.",
+        tried: "Runs 20 steps and reads after each of them, and the same in another instance that is read only at the end, and compares.",
+        fix: "Compute in DoStep; let getters only return values." },
     Check { id: "T10", clause: "hardening", levels: Levels::HARD, run: Run::Any(determinism),
         requirement: "Two instances with the same inputs give the same results bit for bit.",
         tried: "Runs two instances one after the other, in each interface, and compares all variables; no other check compares a variable in which \
@@ -93,6 +97,18 @@ pub(crate) const CHECKS: &[Check] = &[
         requirement: "Two processes with different addresses give the same results bit for bit.",
         tried: "Runs in two processes and compares hashes.", fix: "Avoid any dependence on addresses, time or the process." },
 ];
+
+fn unread(session: &Session) -> Result<(), NotDetermined> {
+    let read = trajectory(&session.stepping()?, 20)?;
+    let instance = session.stepping()?;
+    for k in 0..20 {
+        instance.change_inputs(k)?;
+        instance.steps(1, session.h())?;
+    }
+    let last = instance.snapshot(&session.watched())?;
+    session.compare("read after the last of 20 steps only", &read[read.len() - 1..], &[last]);
+    Ok(())
+}
 
 fn start_times(session: &Session) -> Result<(), NotDetermined> {
     session.cases([0.0, -1.0, 1000.0, 1e6], |start| {

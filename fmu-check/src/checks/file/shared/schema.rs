@@ -2,6 +2,7 @@
 
 use crate::checks::file::shared::schema_rules::{BUILD, Rule, TERMINALS, V2, V3, expand, words};
 use model_description::{Element, FmiVersion, TextContent, parse_number};
+use std::borrow::Cow;
 use std::str::FromStr;
 
 /// The namespace of the attributes that XML Schema itself allows in every element.
@@ -123,7 +124,8 @@ impl Walk<'_> {
         for word in &all {
             let (name, form) = word.split_once(':').unwrap_or((word, "s"));
             let (form, required) = form.strip_suffix('!').map_or((form, false), |form| (form, true));
-            let form = form.replace('N', &own_type(&element.name));
+            let form =
+                if form.contains('N') { form.replace('N', &own_type(&element.name)).into() } else { Cow::from(form) };
             match element.get(name) {
                 None if required => self.findings.push(format!("{at} has no attribute {name}")),
                 Some(value) if !fits(value, &form) => {
