@@ -33,7 +33,7 @@ const RUN: &[Row] = &[
     ("CATIA-Systems/FMIKit-Simulink/issues/326", Both(3), "E17f", &["E17"]),
     ("NTNU-IHB/PythonFMU/pull/213", Small(2), "AGAIN", &["B07a"]),
     // Memory and files that each instance leaves.
-    ("NTNU-IHB/PythonFMU/pull/70", Small(2), "B07s", &["B07a"]),
+    ("NTNU-IHB/PythonFMU/pull/70", Small(2), "B07s", &["B07a", "B07l"]),
     ("OpenModelica/OpenModelica/issues/5775", Small(3), "B07a", &["B07a"]),
     ("CATIA-Systems/FMPy/issues/110", Small(2), "B08o", &["B08p"]),
     // States without parameters, without the time, as bytes that only their instance reads.

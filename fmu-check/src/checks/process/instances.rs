@@ -236,7 +236,7 @@ const MINIMUM: u64 = 300_000;
 /// Maximum number of variables that each instance reads: more of them leave time for few instances.
 const READ: usize = 1000;
 
-/// The same for each step.
+/// Maximum number of variables that the instance of a long run reads after each step.
 const READ_BY_STEP: usize = 20;
 
 /// Bytes of memory more than `before`.
