@@ -1,8 +1,8 @@
 //! No control sample is lost or doubled, regardless of the communication step and however the importer adds up its time.
 //!
 //! A model that counts its samples, through the C functions; the expected results are counted in integers. 1e7 steps of every
-//! step size from every start with optimization; without, of a third of a sample from one start, and a fortieth of the others.
-//! `FMU_STEPS=n` for another number.
+//! step size from every start with optimization. Without it, 1e7 steps of a third of a sample from one start, and a fortieth of that
+//! in all other cases. `FMU_STEPS=n` selects another number.
 #![allow(missing_docs, clippy::float_cmp)]
 #![allow(
     clippy::undocumented_unsafe_blocks,

@@ -101,7 +101,7 @@ mod tests {
         // Through zero.
         assert_eq!(first(|t| 50.0 * (40.0 * t).cos(), |angle| angle), None, "to and fro");
         assert!(first(|t| 50.0 * (40.0 * t).cos(), |_| 1.0).is_some(), "to and fro with a fixed angle");
-        // A vibration turns too little in one direction to be judged by it.
+        // A vibration of ±0.125 rad: the turns in both directions count.
         assert!(first(|t| 50.0 * (400.0 * t).cos(), |_| 1.0).is_some(), "a vibration with a fixed angle");
         let jumps = |angle: f64| if angle > 50.0 { angle + 2.0 } else { angle };
         assert_eq!(first(|_| 200.0, jumps), None, "an angle that jumps once");

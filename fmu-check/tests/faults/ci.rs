@@ -187,7 +187,7 @@ fn several_files_have_one_summary() {
     assert_eq!((html.matches("<h1>").count(), html.matches("<html").count()), (3, 1));
 }
 
-/// A file that is not an FMU hides nothing of the others.
+/// A file that is not an FMU does not hide the reports of the others.
 #[test]
 fn the_others_are_reported_beside_a_broken_file() {
     let dir = tempfile::tempdir().unwrap();

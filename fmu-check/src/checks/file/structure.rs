@@ -240,7 +240,7 @@ fn derivatives(fmu: &FmuFile) -> Verdict {
             let of = v.derivative?;
             let fault = match d.referenced(of) {
                 None => format!("derivative={of}, which does not exist"),
-                Some(other) if other.name == v.name => "itself as the variable that it is the derivative of".into(),
+                Some(other) if other.name == v.name => format!("derivative={of}, which is the variable itself"),
                 Some(other) if !(other.base.is_float() && v.base.is_float()) => {
                     format!("derivative={of}, but derivatives and their variables are floating-point")
                 }

@@ -35,7 +35,7 @@ pub(crate) const CHECKS: &[Check] = &[
         tried: "Creates, runs, reads and frees some thousand instances and measures memory.",
         fix: "Free in FreeInstance what Instantiate allocated; a sanitizer finds it." },
     Check { id: "B07l", clause: "hardening", levels: Levels::HARD, run: Run::Probe(grows),
-        requirement: "An instance needs no more memory the longer it runs.",
+        requirement: "The memory of an instance does not grow while it runs.",
         tried: "Makes up to 9000 steps within the default experiment, reads the outputs after each, and measures memory after the first third and \
             at the end.",
         fix: "Free what a step or a getter allocates, and keep no history that grows with time." },
@@ -334,8 +334,9 @@ fn grows(session: &Session) -> Result<(), NotDetermined> {
     let before = memory();
     let n = round(STEPS[1])?;
     if n < 300 {
-        let why =
-            format!("{first} and then {n} steps until the default experiment or 0.4 s were over: too few for memory");
+        let why = format!(
+            "only {first} and then {n} steps within the default experiment and 0.4 s each: too few to measure memory"
+        );
         return session.not_applicable(why);
     }
     let growth = growth(before);

@@ -86,7 +86,7 @@ pub(crate) const CHECKS: &[Check] = &[
         tried: "Steps on after the end.", fix: "Return Error until the FMU is reset." },
     Check { id: "T14", clause: "hardening", levels: Levels::HARD, run: Run::Probe(unread),
         requirement: "Reading variables does not change the run.",
-        tried: "Runs 20 steps and reads after each of them, and the same in another instance that is read only at the end, and compares.",
+        tried: "Runs 20 steps in two instances, reads one after each step and the other at the end, and compares.",
         fix: "Compute in DoStep; let getters only return values." },
     Check { id: "T10", clause: "hardening", levels: Levels::HARD, run: Run::Any(determinism),
         requirement: "Two instances with the same inputs give the same results bit for bit.",

@@ -2,6 +2,7 @@
 
 pub(crate) mod clock_rules;
 pub(crate) mod clocked;
+pub(crate) mod date_and_time;
 pub(crate) mod layered;
 pub(crate) mod libraries;
 pub(crate) mod names;
