@@ -1,4 +1,4 @@
-//! `xs:dateTime` (XML Schema 1.0, part 2, 3.2.7), the type of generationDateAndTime in both standards.
+//! `xs:dateTime` (XML Schema 1.0, part 2: dateTime), the type of generationDateAndTime in both standards.
 //!
 //! ```text
 //! [-]YYYY-MM-DDThh:mm:ss[.fraction][Z | +hh:mm | -hh:mm]
