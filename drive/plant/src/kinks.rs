@@ -8,6 +8,7 @@ use crate::integration::LONGEST_STEP;
 use crate::legs::Legs;
 use crate::losses::flow::{Drops, Path, Switches};
 use crate::losses::sides::{OneSided, Sides};
+use crate::losses::zone::InZone;
 use crate::mechanics::{Coulomb, SHORTEST_STEP, Shaft, Standstill, Whole};
 use crate::model::PmsmPlant;
 use crate::state::State;
@@ -17,7 +18,7 @@ use drive_base::frame::{AlphaBeta, Dq};
 const SHORTEST_AT_KINK: f64 = 0.5e-6;
 
 /// Maximum integration step that resolves a current in the zone, as a share of its time constant.
-const RESOLVED: f64 = 0.5;
+const RESOLVED: f64 = 0.625;
 
 /// Maximum electrical angle in rad of an integration step with losses: the energies then balance to 1e-7 over a drive cycle.
 const LARGEST_TURN_WITH_LOSSES: f64 = 0.0625;
@@ -28,12 +29,21 @@ const LARGEST_TURN_DAMPED: f64 = 0.125;
 /// Maximum damped step in s.
 const LONGEST_STEP_DAMPED: f64 = 50e-6;
 
-/// An integration step of `h` (s) under the voltage `u` (V); `one_sided` are the legs if the currents keep their sides.
+/// Legs and devices in the simplest form that holds for a step.
+enum Form {
+    /// No current is in the zone, and each keeps its side.
+    OneSided(OneSided),
+    /// Each current keeps its side.
+    InZone(InZone),
+    /// The step contains kinks.
+    Any(Switches),
+}
+
+/// An integration step of `h` (s) under the voltage `u` (V).
 struct Step<'a> {
     h: f64,
     u: AlphaBeta,
-    switches: &'a Switches,
-    one_sided: Option<&'a OneSided>,
+    form: &'a Form,
     /// The step is long compared with the time constant of a current in the zone.
     damped: bool,
 }
@@ -64,34 +74,48 @@ impl PmsmPlant {
         let resolved = LONGEST_STEP.min(RESOLVED * time);
         let dissipation = |speed| parameters.dissipation(machine.resistance(), machine.electrical(speed));
         let at_start = dissipation(state.speed);
-        let guide = |state: &State, one_sided: Option<&OneSided>| {
+        let guide = |state: &State, form: &Form| {
             let psi = machine.to_stator(state.axis, state.psi);
             let (i, w) = (state.axis.to_stator(machine.current(state.psi)), machine.electrical(state.speed));
-            switches.guided(match one_sided {
-                Some(&drops) => Path { u, dissipation: at_start, drops }.guides(psi, i, w),
-                None => Path { u, dissipation: at_start, drops: switches }.guides(psi, i, w),
+            switches.guided(match *form {
+                Form::OneSided(drops) => Path { u, dissipation: at_start, drops }.guides(psi, i, w),
+                Form::InZone(drops) => Path { u, dissipation: at_start, drops }.guides(psi, i, w),
+                Form::Any(drops) => Path { u, dissipation: at_start, drops }.guides(psi, i, w),
             })
         };
-        let (mut passed, mut left, mut start) = (Passed::default(), h, guide(state, None));
+        // Damped steps contain kinks; others end at them.
+        let resolves = resolved > SHORTEST_RESOLVED;
+        let form = |sides: &Sides| {
+            if !kinks || sides.apart() {
+                Form::OneSided(switches.one_sided(u, sides))
+            } else {
+                switches.in_zone(u, sides).filter(|_| resolves).map_or(Form::Any(switches), Form::InZone)
+            }
+        };
+        let (mut passed, mut left, mut start) = (Passed::default(), h, guide(state, &Form::Any(switches)));
         let mut sides = Sides::of(start, zone);
-        let mut one_sided = switches.one_sided(u, &sides);
+        let mut now = form(&sides);
         // Time since the last kink or change of the voltage, and maximum length of the next step.
         let (mut since, mut limit) = (0.0, f64::INFINITY);
         let mut searches = 1000.0 + h * MOST_SEARCHES;
         loop {
-            let apart = !kinks || sides.apart();
-            let longest = if apart { LONGEST_STEP } else { Self::longest_after(since, time) };
+            let apart = matches!(now, Form::OneSided(_));
+            let longest = match now {
+                Form::OneSided(_) => LONGEST_STEP,
+                _ if resolves => resolved,
+                _ => Self::longest_damped(since, time),
+            };
             let turn = if apart { LARGEST_TURN_WITH_LOSSES } else { LARGEST_TURN_DAMPED };
             let longest = longest.min(turn / machine.electrical(state.speed).abs());
             let h = if left <= longest {
                 left
-            } else if apart {
+            } else if apart || resolves {
                 left / (left / longest - 1e-9).ceil()
             } else {
                 longest
             };
             let h = h.min(limit);
-            let step = Step { h, u, switches: &switches, one_sided: apart.then_some(&one_sided), damped: h > resolved };
+            let step = Step { h, u, form: &now, damped: !resolves && h > resolved };
             let mechanics = &parameters.mechanics;
             let (next, step) = if mechanics.is_whole(state.speed) {
                 self.integrate_kinks(state, &step, Whole::new(mechanics, state.speed))
@@ -102,21 +126,21 @@ impl PmsmPlant {
                 limit = shorter;
                 continue;
             }
-            let end = guide(&next, apart.then_some(&one_sided));
+            let end = guide(&next, &now);
             let shortest = SHORTEST_AT_KINK.min(resolved).max(SHORTEST_STEP);
             (limit, since) = (f64::INFINITY, since + h);
             let then = Sides::of(end, zone);
             if kinks && then != sides {
                 if h > shortest
                     && searches > 0.0
-                    && let Some(share) = sides.first_crossing(start, end, zone)
+                    && let Some(share) = sides.first_crossing(start, end, zone, switches.tolerances())
                 {
                     (limit, since) = ((h * share).max(shortest), since - h);
                     searches -= 1.0;
                     continue;
                 }
                 (sides, since) = (then, 0.0);
-                one_sided = switches.one_sided(u, &sides);
+                now = form(&sides);
             }
             start = end;
             passed.add(&step);
@@ -129,12 +153,9 @@ impl PmsmPlant {
         }
     }
 
-    /// Maximum integration step in s with a current in the zone that settles with this `time` constant (s), `since` (s) after
-    /// the voltage changed. The first two damped steps are 1.5 and 4.5 time constants long, for the energies of the settling.
-    fn longest_after(since: f64, time: f64) -> f64 {
-        if RESOLVED * time > SHORTEST_RESOLVED {
-            return LONGEST_STEP.min(RESOLVED * time);
-        }
+    /// Maximum damped step in s with a current in the zone that settles with this `time` constant (s), `since` (s) after the
+    /// voltage changed: first 1.5 and 4.5 time constants, for the energies of the settling.
+    fn longest_damped(since: f64, time: f64) -> f64 {
         let longest = if since < 1.4 * time {
             1.5 * time
         } else if since < 5.9 * time {
@@ -162,7 +183,7 @@ impl PmsmPlant {
     fn integrate_kinks<C: Coulomb<f64>>(
         &self,
         start: &State,
-        &Step { h, u, switches, one_sided, damped }: &Step<'_>,
+        &Step { h, u, form, damped }: &Step<'_>,
         coulomb: C,
     ) -> (State, Passed) {
         let (parameters, machine) = (&self.parameters, self.machine::<false>());
@@ -170,17 +191,21 @@ impl PmsmPlant {
         let tau_e = machine.torque(start.psi, machine.current(start.psi));
         let speed = start.speed + 0.5 * h * shaft.motion(start.speed, tau_e).acceleration;
         let dissipation = parameters.dissipation(machine.resistance(), machine.electrical(speed));
-        if let Some(&drops) = one_sided {
-            let path = Path { u, dissipation, drops };
-            self.integrate(start, h, &Circuit { machine, path, shaft })
-        } else {
-            let path = Path { u, dissipation, drops: *switches };
-            let circuit = Circuit { machine, path, shaft };
-            if damped {
-                let small = DIFFERENCE * switches.legs.i_zone() * self.warm.least_inductance;
-                self.integrate_damped(start, h, &circuit, small)
-            } else {
-                self.integrate(start, h, &circuit)
+        match *form {
+            Form::OneSided(drops) => {
+                self.integrate(start, h, &Circuit { machine, path: Path { u, dissipation, drops }, shaft })
+            }
+            Form::InZone(drops) => {
+                self.integrate(start, h, &Circuit { machine, path: Path { u, dissipation, drops }, shaft })
+            }
+            Form::Any(drops) => {
+                let circuit = Circuit { machine, path: Path { u, dissipation, drops }, shaft };
+                if damped {
+                    let small = DIFFERENCE * drops.legs.i_zone() * self.warm.least_inductance;
+                    self.integrate_damped(start, h, &circuit, small)
+                } else {
+                    self.integrate(start, h, &circuit)
+                }
             }
         }
     }

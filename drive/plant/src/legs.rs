@@ -167,6 +167,18 @@ impl<S: Scalar> Legs<S> {
 }
 
 impl Legs {
+    /// Whether the zone follows from the ripple.
+    #[inline]
+    pub fn is_rippled(&self) -> bool {
+        self.ripple.is_some()
+    }
+
+    /// The maximum voltage drop in V.
+    #[inline]
+    pub fn u_dead(&self) -> f64 {
+        self.u
+    }
+
     /// Voltage (V) lost at the stator for currents with these `signs` outside the zone.
     #[inline]
     pub fn loss_beyond(&self, signs: Phases) -> AlphaBeta {

@@ -116,6 +116,11 @@ fn a_step_of_a_sample_period_is_as_good_as_64() {
         let Case { name, i, losses, .. } = case;
         let off = loss / fine_loss - 1.0;
         println!("{name}, {i} A, losses {losses}: {error:.1e} A of {greatest:.3} A, {off:.1e} of {fine_loss:.3} J");
-        assert!(error < 8e-3 * greatest && off.abs() < 1e-3, "{name}, {i} A, losses {losses}: {error} A, {off}");
+        // The current of the traction machine settles in 1 us where it is in the zone.
+        let (of_current, of_energy) = if name == "traction" { (8e-3, 1e-3) } else { (2e-3, 2e-5) };
+        assert!(
+            error < of_current * greatest && off.abs() < of_energy,
+            "{name}, {i} A, losses {losses}: {error} A, {off}"
+        );
     }
 }

@@ -127,8 +127,8 @@ pub struct Conduction<S> {
     /// Half of the sum and of the difference of transistor and diode: threshold in V, resistance in Ohm.
     u: [f64; 2],
     r: [f64; 2],
-    /// DC-link voltage in V.
-    u_dc: S,
+    /// 2 / u_dc in 1/V; 0 without a DC link.
+    by_u_dc: S,
     /// Current in A below which the threshold falls linearly.
     i_zone: S,
 }
@@ -139,34 +139,48 @@ impl<S: Scalar> Conduction<S> {
         let &Devices { u_transistor, r_transistor, u_diode, r_diode, .. } = devices;
         let (u, r) = if switching { (u_transistor, r_transistor) } else { (u_diode, r_diode) };
         let halves = |a: f64, b: f64| [0.5 * (a + b), 0.5 * (a - b)];
-        let found = Self { u: halves(u, u_diode), r: halves(r, r_diode), u_dc, i_zone };
+        let by_u_dc = if u_dc.value() > 0.0 { S::from(2.0) / u_dc } else { 0.0.into() };
+        let found = Self { u: halves(u, u_diode), r: halves(r, r_diode), by_u_dc, i_zone };
         (found.u[0] > 0.0 || found.r[0] > 0.0).then_some(found)
     }
 
     /// Voltage drop (V) at the stator with the voltage `u` (V) of the legs and the current `i` (A).
     pub fn drop(&self, u: Vector<Stator, S>, i: Vector<Stator, S>) -> Vector<Stator, S> {
-        let (on, i) = (self.on(u), Phases::from_stator(i));
-        let leg = |on: S, i: S| {
-            let sign = clamp_unit(i / self.i_zone);
+        let i = Phases::from_stator(i);
+        let sign = |i: S| clamp_unit(i / self.i_zone);
+        self.drop_with(u, i, Phases { a: sign(i.a), b: sign(i.b), c: sign(i.c) })
+    }
+
+    /// The [`drop`](Self::drop) (V) with these `signs` of the currents `i` (A), linear in the zone.
+    #[inline]
+    pub fn drop_with(&self, u: Vector<Stator, S>, i: Phases<S>, signs: Phases<S>) -> Vector<Stator, S> {
+        let on = self.on(u);
+        let leg = |on: S, i: S, sign: S| {
             let transistor = sign * on;
             (transistor * self.u[1] + self.u[0].into()) * sign + (transistor * self.r[1] + self.r[0].into()) * i
         };
-        Phases { a: leg(on.a, i.a), b: leg(on.b, i.b), c: leg(on.c, i.c) }.to_stator()
+        Phases { a: leg(on.a, i.a, signs.a), b: leg(on.b, i.b, signs.b), c: leg(on.c, i.c, signs.c) }.to_stator()
     }
 
     /// 2 d - 1 of the legs with the voltage `u` (V).
+    #[inline]
     fn on(&self, u: Vector<Stator, S>) -> Phases<S> {
         let u = Phases::from_stator(u);
         let max = |a: S, b: S| if a.value() > b.value() { a } else { b };
         let min = |a: S, b: S| if a.value() < b.value() { a } else { b };
         let middle = (max(max(u.a, u.b), u.c) + min(min(u.a, u.b), u.c)) * 0.5;
-        let by_u_dc = if self.u_dc.value() > 0.0 { S::from(2.0) / self.u_dc } else { 0.0.into() };
-        let leg = |u: S| clamp_unit((u - middle) * by_u_dc);
+        let leg = |u: S| clamp_unit((u - middle) * self.by_u_dc);
         Phases { a: leg(u.a), b: leg(u.b), c: leg(u.c) }
     }
 }
 
 impl Conduction<f64> {
+    /// The larger threshold voltage in V.
+    #[inline]
+    pub fn threshold(&self) -> f64 {
+        self.u[0] + self.u[1].abs()
+    }
+
     /// The [`drop`](Self::drop) (V) while the currents of the legs have these `signs`.
     #[inline]
     pub fn affine(&self, u: AlphaBeta, signs: Phases) -> Affine {

@@ -6,7 +6,7 @@
 //! ```
 //!
 //! [`iron`](crate::iron), [`conduction`] and [`switching`] have the equations; [`flow`] joins them; between two kinks,
-//! [`sides`] makes legs and devices affine. The efficiency is p_mech / p_in of a motor, p_in / p_mech of a generator, and 0
+//! [`sides`] and [`zone`] replace legs and devices by simpler ones. The efficiency is p_mech / p_in of a motor, p_in / p_mech of a generator, and 0
 //! elsewhere: where power enters from both sides, where p_mech is below 1 uW, and where the ratio is above 1 because stored
 //! energy supplies the power.
 
@@ -16,6 +16,7 @@ mod figures;
 pub mod flow;
 pub mod sides;
 pub mod switching;
+pub mod zone;
 
 use fmu_core::unit::WATT;
 use fmu_core::{Row, Scalar, Table, table};

@@ -11,7 +11,7 @@
 //! Runge-Kutta step that contains a kink closes the energy balance to second order only; one that ends at the kink, to the
 //! fourth.
 
-use crate::losses::conduction::Affine;
+use crate::losses::conduction::{Affine, Conduction};
 use crate::losses::flow::{Drops, Switches};
 use drive_base::frame::{AlphaBeta, Phases};
 
@@ -20,10 +20,13 @@ use drive_base::frame::{AlphaBeta, Phases};
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Sides([[i8; 3]; 2]);
 
-impl Sides {
-    /// Allowed excess of a current over its edge at the end of a step, as a share of the zone.
-    const TOLERANCE: f64 = 0.02;
+/// Allowed error of the voltage beyond an edge, as a share of the greatest drop.
+const TOLERANCE: f64 = 0.008;
 
+/// Maximum excess of a current over its edge, as a share of the zone.
+const MOST: f64 = 0.05;
+
+impl Sides {
     /// The sides of the currents `i` (A) with the zone +-`zone` (A).
     #[inline]
     pub fn of(i: [AlphaBeta; 2], zone: f64) -> Self {
@@ -34,18 +37,29 @@ impl Sides {
         }))
     }
 
+    /// Of each leg: for the dead-time voltage, and for the drop of the devices.
+    #[inline]
+    pub(super) fn legs(self) -> [[i8; 3]; 2] {
+        self.0
+    }
+
     /// Whether no current is inside the zone.
     #[inline]
     pub fn apart(&self) -> bool {
         self.0.iter().flatten().all(|&side| side != 0)
     }
 
-    /// Share of a step after which the first current crosses the edge of its side, if one leaves its side by more than the
-    /// tolerance while the currents go from `start` (A) to `end` (A). The point lies half the tolerance outside the edge.
-    #[inline]
-    pub fn first_crossing(&self, start: [AlphaBeta; 2], end: [AlphaBeta; 2], zone: f64) -> Option<f64> {
-        let tolerance = Self::TOLERANCE * zone;
-        let leg = |side: i8, from: f64, to: f64| {
+    /// Share of a step after which the first current crosses the edge of its side, if one leaves its side by more than its
+    /// tolerance (A) while the currents go from `start` (A) to `end` (A). The point lies half the tolerance outside the edge.
+    #[inline(never)]
+    pub fn first_crossing(
+        &self,
+        start: [AlphaBeta; 2],
+        end: [AlphaBeta; 2],
+        zone: f64,
+        tolerances: [f64; 2],
+    ) -> Option<f64> {
+        let leg = |side: i8, from: f64, to: f64, tolerance: f64| {
             // The lower and upper edges; a side outside the zone has only one.
             let (below, above) = (if side > 0 { zone } else { -zone }, if side < 0 { -zone } else { zone });
             let edge = if side <= 0 && to > above + tolerance {
@@ -58,15 +72,16 @@ impl Sides {
             ((edge - from) / (to - from)).clamp(0.0, 1.0)
         };
         let mut share = 1.0_f64;
-        for ([a, b, c], (start, end)) in self.0.into_iter().zip(start.into_iter().zip(end)) {
-            let (start, end) = (Phases::from_stator(start), Phases::from_stator(end));
+        for (k, tolerance) in tolerances.into_iter().enumerate() {
+            let ([a, b, c], start, end) = (self.0[k], Phases::from_stator(start[k]), Phases::from_stator(end[k]));
+            let leg = |side, from, to| leg(side, from, to, tolerance);
             share = share.min(leg(a, start.a, end.a)).min(leg(b, start.b, end.b)).min(leg(c, start.c, end.c));
         }
         (share < 1.0).then_some(share)
     }
 }
 
-fn phases(signs: [i8; 3]) -> Phases {
+pub(super) fn phases(signs: [i8; 3]) -> Phases {
     let [a, b, c] = signs.map(f64::from);
     Phases { a, b, c }
 }
@@ -91,6 +106,16 @@ impl Switches {
         let u = if legs.drop() { u - legs.loss_beyond(dead_time) } else { u };
         let drop = conduction.as_ref().map(|conduction| conduction.affine(u, devices));
         OneSided { u, drop, sw: devices.to_stator() * (1.5 * sw) }
+    }
+
+    /// Allowed excess (A) of the currents of [`Sides`] over their edges at the end of a step: where the voltage that depends on
+    /// them is off by [`TOLERANCE`] of the whole.
+    #[inline(never)]
+    pub fn tolerances(&self) -> [f64; 2] {
+        let zone = self.legs.i_zone();
+        let (dead_time, threshold) = (self.legs.u_dead(), self.conduction.as_ref().map_or(0.0, Conduction::threshold));
+        let whole = TOLERANCE * (dead_time + threshold);
+        [dead_time, threshold].map(|u| zone * if u * MOST > whole { whole / u } else { MOST })
     }
 
     /// The currents (A) of [`Path::guides`](super::flow::Path::guides), each also instead of one without a kink.
@@ -167,15 +192,18 @@ mod tests {
         let phases = |a: f64, b: f64| [Phases { a, b, c: -a - b }.to_stator(); 2];
         let (start, end) = (phases(3.0, 0.0), phases(-1.0, 0.5));
         let sides = Sides::of(start, 0.2);
-        let half = 0.5 * Sides::TOLERANCE * 0.2;
-        let share = sides.first_crossing(start, end, 0.2).unwrap();
+        let (tolerances, half) = ([2e-3, 4e-3], 1e-3);
+        let share = sides.first_crossing(start, end, 0.2, tolerances).unwrap();
         assert!((share - 0.4 - half / 0.5).abs() < 1e-12 && !sides.apart(), "{share}");
         // b has left the zone; a is next, at the upper edge.
         let next = Sides::of(phases(1.4, 0.2 + half), 0.2);
         assert_eq!(next.0, [[1, 1, -1]; 2]);
-        let share = next.first_crossing(start, end, 0.2).unwrap();
+        let share = next.first_crossing(start, end, 0.2, tolerances).unwrap();
         assert!((share - 0.7 - half / 4.0).abs() < 1e-12, "{share}");
-        assert!(sides.first_crossing(start, phases(2.0, 0.1), 0.2).is_none());
-        assert!(sides.first_crossing(start, phases(2.0, 0.2 + half), 0.2).is_none(), "within the tolerance");
+        assert!(sides.first_crossing(start, phases(2.0, 0.1), 0.2, tolerances).is_none());
+        assert!(
+            sides.first_crossing(start, phases(2.0, 0.2 + half), 0.2, tolerances).is_none(),
+            "within the tolerance"
+        );
     }
 }
