@@ -3,18 +3,28 @@
 //!
 //! Each check forms a ratio of the value to others in the file, and states the range of this ratio for real machines: L i / psi_M
 //! at the maximum current; R_s i against u_dc; the EMF at rated speed against u_dc / sqrt(3); the time in which the rated
-//! torque reaches the rated speed; the rated torque against that of the maximum current; the
-//! highest speed against the rated speed.
+//! torque reaches the rated speed; the rated torque against that of the maximum current; friction against the rated torque. The value
+//! to correct may be another one of the ratio: the error names the one that, converted from another unit, brings all ratios into
+//! their ranges.
 
 use super::motor::{Data, Located, MotorFile};
 use crate::error::{Result, bail};
 use fmu_core::digits::rounded;
+use std::f64::consts::PI;
 
-/// A value, its plausible range, and other units in which it may have been written, with their size in the expected unit.
-struct Check<'a> {
+/// Other units in which a value may have been written, with their size in the expected unit.
+type Units = &'static [(&'static str, f64)];
+
+/// A value, its position, and the ratio by which it is judged.
+struct Check {
     name: &'static str,
-    value: &'a Located,
     unit: &'static str,
+    units: Units,
+    /// The value in the data, unless it is one of a list.
+    of: fn(&mut Data) -> Option<&mut Located>,
+    value: f64,
+    /// Position in the file.
+    at: usize,
     /// The judged quantity per unit of the value; it is proportional to the value.
     per_unit: f64,
     what: &'static str,
@@ -23,7 +33,45 @@ struct Check<'a> {
     usual: (f64, f64),
     /// Advice if no other unit fits.
     remedy: String,
-    units: &'static [(&'static str, f64)],
+}
+
+impl Check {
+    fn judged(&self) -> f64 {
+        self.value * self.per_unit
+    }
+
+    fn passes(&self) -> bool {
+        // Without the values it is compared with, there is no ratio.
+        self.judged().is_nan() || (self.range.0..=self.range.1).contains(&self.judged())
+    }
+
+    /// Whether the value, in a unit of this `size`, is a usual one.
+    fn fits(&self, size: f64) -> bool {
+        (self.usual.0..=self.usual.1).contains(&(self.judged() * size))
+    }
+
+    /// Whether all values are plausible once this one is converted from a unit of this `size`.
+    fn cures(&self, size: f64, data: &Data) -> bool {
+        let mut data = data.clone();
+        let Some(value) = (self.of)(&mut data) else { return false };
+        *value.get_mut() *= size;
+        self.fits(size) && checks(&mut data).iter().all(Self::passes)
+    }
+
+    /// The first other unit with this property, and the converted value.
+    fn written_in(&self, fits: impl Fn(f64) -> bool) -> Option<String> {
+        let &Self { value, unit, .. } = self;
+        let (other, size) = self.units.iter().find(|(_, size)| fits(*size))?;
+        Some(format!("{value} {other} would fit: write {} {unit}", rounded(value * size, 4)))
+    }
+
+    fn usual(self, low: f64, high: f64) -> Self {
+        Self { usual: (low, high), ..self }
+    }
+
+    fn remedy(self, remedy: impl Into<String>) -> Self {
+        Self { remedy: remedy.into(), ..self }
+    }
 }
 
 /// Checks all values.
@@ -31,39 +79,54 @@ struct Check<'a> {
 /// # Errors
 /// The first value that is out of its range: the value, the expected range, and a unit that would fit.
 pub fn check(motor: &MotorFile) -> Result<()> {
-    checks(&motor.data).iter().try_for_each(|check| one(motor, check))
-}
-
-fn one(motor: &MotorFile, check: &Check<'_>) -> Result<()> {
-    let &Check { name, value, unit, per_unit, what, range: (low, high), usual, ref remedy, units } = check;
-    let x = *value.get_ref();
-    if (low..=high).contains(&(x * per_unit)) {
-        return Ok(());
-    }
-    let fits = |x: f64| (usual.0..=usual.1).contains(&(x * per_unit));
-    let suggestion = units.iter().find(|(_, size)| fits(x * size)).map_or_else(
-        || remedy.clone(),
-        |(other, size)| format!("{x} {other} would fit: write {} {unit}", rounded(x * size, 4)),
-    );
+    let data = &motor.data;
+    let all = checks(&mut data.clone());
+    let Some(failed) = all.iter().find(|check| !check.passes()) else { return Ok(()) };
+    let &Check { name, value, unit, what, range: (low, high), ref remedy, .. } = failed;
+    let cure = |check: &Check| check.written_in(|size| check.cures(size, data));
+    // Another value, if it is the only one.
+    let other = || {
+        let mut found = all.iter().filter_map(|check| Some((check, cure(check)?)));
+        let (check, suggestion) = found.next()?;
+        let place = motor.place_at(check.at);
+        found.all(|(other, _)| other.name == check.name).then(|| format!("{}: {place}: {suggestion}", check.name))
+    };
+    let suggestion = cure(failed).or_else(other).or_else(|| failed.written_in(|size| failed.fits(size)));
     bail!(
-        "{}: {name} = {x} {unit} makes {what} {}, expected {low} to {high}: {suggestion}",
-        motor.place(value),
-        rounded(x * per_unit, 4)
+        "{}: {name} = {} makes {what} {}, expected {low} to {high}: {}",
+        motor.place_at(failed.at),
+        format!("{value} {unit}").trim_end(),
+        rounded(failed.judged(), 4),
+        suggestion.as_ref().unwrap_or(remedy)
     )
 }
 
-const SPEED: &[(&str, f64)] = &[("rpm", std::f64::consts::PI / 30.0), ("deg/s", std::f64::consts::PI / 180.0)];
+const SPEED: Units = &[("rpm", PI / 30.0), ("deg/s", PI / 180.0)];
+const VOLTAGE: Units = &[("kV", 1e3), ("mV", 1e-3)];
+const CURRENT: Units = &[("mA", 1e-3), ("kA", 1e3)];
+const RESISTANCE: Units = &[("mOhm", 1e-3), ("uOhm", 1e-6)];
+const INDUCTANCE: Units = &[("mH", 1e-3), ("uH", 1e-6)];
+const FLUX_LINKAGE: Units = &[("mWb", 1e-3), ("uWb", 1e-6)];
+const TORQUE: Units = &[("mN.m", 1e-3), ("N.cm", 1e-2), ("kN.m", 1e3)];
+const INERTIA: Units = &[("kg.cm2", 1e-4), ("g.cm2", 1e-7), ("g.m2", 1e-3)];
+const ENERGY: Units = &[("mJ", 1e-3), ("uJ", 1e-6)];
+const POWER: Units = &[("kW", 1e3), ("mW", 1e-3)];
+const FREQUENCY: Units = &[("kHz", 1e3), ("MHz", 1e6)];
+const TIME: Units = &[("ms", 1e-3), ("us", 1e-6)];
+const PER_KELVIN: Units = &[("%/K", 1e-2), ("ppm/K", 1e-6)];
 
 const CORRECT: &str = "correct it, or the values it is compared with";
+const MAGNET: &str = "a magnet weakens as it warms: NdFeB has -1.1e-3, SmCo -0.4e-3, ferrite -2e-3";
 
-const INDUCTANCE: &[(&str, f64)] = &[("mH", 1e-3), ("uH", 1e-6)];
+/// Switching frequency in Hz where the file has none, for the judgment of an energy.
+const USUAL_FREQUENCY: f64 = 1e4;
 
-fn checks(data: &Data) -> Vec<Check<'_>> {
+fn checks(data: &mut Data) -> Vec<Check> {
     let (machine, rating) = (&data.machine, &data.rating);
     let of = |x: &Located| *x.get_ref();
     let (n_p, psi_M, i, u_dc) =
         (f64::from(*machine.n_p.get_ref()), of(&machine.psi_M), of(&rating.current), of(&data.dc_link.u_dc));
-    let (speed, torque) = (of(&rating.speed), of(&rating.torque));
+    let (speed, torque, top) = (of(&rating.speed), of(&rating.torque), rating.top());
     let of_kv = format!(
         "it is the peak value of a phase: from KV in rpm/V, 60 / (2 pi sqrt(3) n_p KV) with n_p = {n_p} pole pairs; for the EMF \
          to reach u_dc / sqrt(3) at rating.speed, psi_M is {} Wb",
@@ -82,53 +145,115 @@ fn checks(data: &Data) -> Vec<Check<'_>> {
         CORRECT.into()
     };
     let saliency = (of(&machine.L_q) - of(&machine.L_d)).abs();
-    let inductance = |name, value| Check {
-        name,
-        value,
-        unit: "H",
-        per_unit: i / psi_M,
-        what: "L i / psi_M at rating.current",
-        range: (0.003, 30.0),
-        usual: (0.003, 30.0),
-        remedy: CORRECT.into(),
-        units: INDUCTANCE,
-    };
-    let top = rating.speed_max.as_ref().map(|value| Check {
-        name: "rating.speed_max",
-        value,
-        unit: "rad/s",
-        per_unit: 1.0 / speed,
-        what: "its multiple of rating.speed",
-        range: (1.0, 10.0),
-        usual: (1.0, 10.0),
-        remedy: CORRECT.into(),
-        units: SPEED,
+    let emf = n_p * 3.0_f64.sqrt() / u_dc;
+    let part = |x: Option<&Located>| x.map_or(f64::NAN, of);
+    let inverter = data.inverter.as_ref();
+    let switched = part(inverter.and_then(|x| x.i_sw.as_ref())) * part(inverter.and_then(|x| x.u_sw.as_ref()));
+    let frequency = inverter.and_then(|x| x.f_sw.as_ref()).map_or(USUAL_FREQUENCY, of);
+    let friction = "its torque at rating.speed, over rating.torque,";
+    // The pairs of the drag test with the highest speed, and with the greatest torque.
+    let drag_test = data.iron.as_ref().and_then(|iron| {
+        let most = |of: fn(&[f64; 2]) -> f64| iron.p.get_ref().iter().copied().max_by(|a, b| of(a).total_cmp(&of(b)));
+        Some((iron.p.span().start, most(|[speed, _]| *speed)?, most(|[speed, p]| p / speed)?))
     });
+
+    let mut check = |name, unit, units, of: fn(&mut Data) -> Option<&mut Located>, per_unit, what, range| {
+        let (value, at) = of(data).map(|x| (*x.get_ref(), x.span().start))?;
+        Some(Check { name, unit, units, of, value, at, per_unit, what, range, usual: range, remedy: CORRECT.into() })
+    };
     #[rustfmt::skip]
-    let mut all = vec![
-        Check { name: "dc_link.u_dc", value: &data.dc_link.u_dc, unit: "V", per_unit: 1.0,
-            what: "a DC link, in V,", range: (1.0, 1e4), usual: (1.0, 1e4),
-            remedy: CORRECT.into(), units: &[("kV", 1e3)] },
-        Check { name: "machine.psi_M", value: &machine.psi_M, unit: "Wb", per_unit: n_p * speed * 3.0_f64.sqrt() / u_dc,
-            what: "the EMF at rating.speed over u_dc / sqrt(3)", range: (0.02, 50.0), usual: (0.1, 3.0),
-            remedy: of_kv, units: &[("mWb", 1e-3), ("uWb", 1e-6)] },
-        Check { name: "rating.speed", value: &rating.speed, unit: "rad/s", per_unit: n_p * psi_M * 3.0_f64.sqrt() / u_dc,
-            what: "the EMF over dc_link.u_dc / sqrt(3)", range: (0.02, 5.0), usual: (0.02, 5.0),
-            remedy: CORRECT.into(), units: SPEED },
-        inductance("machine.L_d", &machine.L_d),
-        inductance("machine.L_q", &machine.L_q),
-        Check { name: "machine.R_s", value: &machine.R_s, unit: "Ohm", per_unit: i / u_dc,
-            what: "R_s i over u_dc at rating.current", range: (1e-4, 0.6), usual: (2e-3, 0.3),
-            remedy: of_current, units: &[("mOhm", 1e-3), ("uOhm", 1e-6)] },
-        Check { name: "rating.torque", value: &rating.torque, unit: "N.m", per_unit: 1.0 / (1.5 * n_p * (psi_M + saliency * i) * i),
-            what: "its share of the torque that rating.current can give", range: (0.005, 1.5), usual: (0.005, 1.5),
-            remedy: CORRECT.into(), units: &[("mN.m", 1e-3), ("N.cm", 1e-2), ("kN.m", 1e3)] },
-        Check { name: "mechanics.J", value: &data.mechanics.J, unit: "kg.m2", per_unit: speed / torque,
-            what: "the time in s to rating.speed with rating.torque", range: (1e-4, 1e3), usual: (1e-4, 1e3),
-            remedy: CORRECT.into(), units: &[("kg.cm2", 1e-4), ("g.cm2", 1e-7), ("g.m2", 1e-3)] },
+    let found = [
+        check("dc_link.u_dc", "V", VOLTAGE, |d| Some(&mut d.dc_link.u_dc),
+            1.0, "a DC link, in V,", (1.0, 1e4)),
+        check("rating.current", "A", CURRENT, |d| Some(&mut d.rating.current),
+            1.0, "a current, in A,", (0.01, 1e5)),
+        check("machine.psi_M", "Wb", FLUX_LINKAGE, |d| Some(&mut d.machine.psi_M),
+            emf * speed, "the EMF at rating.speed over u_dc / sqrt(3)", (0.02, 50.0)).map(|x| x.usual(0.1, 3.0)).map(|x| x.remedy(of_kv)),
+        check("rating.speed", "rad/s", SPEED, |d| Some(&mut d.rating.speed),
+            emf * psi_M, "the EMF over dc_link.u_dc / sqrt(3)", (0.02, 5.0)),
+        check("machine.L_d", "H", INDUCTANCE, |d| Some(&mut d.machine.L_d),
+            i / psi_M, "L i / psi_M at rating.current", (0.003, 30.0)),
+        check("machine.L_q", "H", INDUCTANCE, |d| Some(&mut d.machine.L_q),
+            i / psi_M, "L i / psi_M at rating.current", (0.003, 30.0)),
+        check("machine.R_s", "Ohm", RESISTANCE, |d| Some(&mut d.machine.R_s),
+            i / u_dc, "R_s i over u_dc at rating.current", (1e-4, 0.6)).map(|x| x.usual(2e-3, 0.3)).map(|x| x.remedy(of_current)),
+        check("rating.torque", "N.m", TORQUE, |d| Some(&mut d.rating.torque),
+            1.0 / (1.5 * n_p * (psi_M + saliency * i) * i), "its share of the torque that rating.current can give", (0.005, 1.5)),
+        check("mechanics.J", "kg.m2", INERTIA, |d| Some(&mut d.mechanics.J),
+            speed / torque, "the time in s to rating.speed with rating.torque", (1e-4, 1e3)),
+        check("rating.speed_max", "rad/s", SPEED, |d| d.rating.speed_max.as_mut(),
+            1.0 / speed, "its multiple of rating.speed", (1.0, 10.0)),
+        check("mechanics.B", "N.m.s/rad", TORQUE, |d| d.mechanics.B.as_mut(),
+            speed / torque, friction, (0.0, 1.0)).map(|x| x.usual(1e-6, 0.5)),
+        check("mechanics.tau_coulomb", "N.m", TORQUE, |d| d.mechanics.tau_coulomb.as_mut(),
+            1.0 / torque, friction, (0.0, 1.0)).map(|x| x.usual(1e-6, 0.5)),
+        check("mechanics.k_w", "N.m.s2/rad2", &[], |d| d.mechanics.k_w.as_mut(),
+            speed * speed / torque, friction, (0.0, 1.0)),
+        check("mechanics.w_coulomb", "rad/s", SPEED, |d| d.mechanics.w_coulomb.as_mut(),
+            1.0 / speed, "its share of rating.speed", (0.0, 0.3)).map(|x| x.usual(1e-6, 0.05)),
+        check("inverter.u_transistor", "V", VOLTAGE, |d| d.inverter.as_mut()?.u_transistor.as_mut(),
+            1.0 / u_dc, "its share of dc_link.u_dc", (0.0, 0.3)).map(|x| x.usual(1e-5, 0.1)),
+        check("inverter.u_diode", "V", VOLTAGE, |d| d.inverter.as_mut()?.u_diode.as_mut(),
+            1.0 / u_dc, "its share of dc_link.u_dc", (0.0, 0.3)).map(|x| x.usual(1e-5, 0.1)),
+        check("inverter.r_transistor", "Ohm", RESISTANCE, |d| d.inverter.as_mut()?.r_transistor.as_mut(),
+            i / u_dc, "the drop at rating.current over dc_link.u_dc", (0.0, 0.3)).map(|x| x.usual(1e-5, 0.1)),
+        check("inverter.r_diode", "Ohm", RESISTANCE, |d| d.inverter.as_mut()?.r_diode.as_mut(),
+            i / u_dc, "the drop at rating.current over dc_link.u_dc", (0.0, 0.3)).map(|x| x.usual(1e-5, 0.1)),
+        check("inverter.i_sw", "A", CURRENT, |d| d.inverter.as_mut()?.i_sw.as_mut(),
+            1.0 / i, "its multiple of rating.current", (0.01, 200.0)).map(|x| x.usual(0.1, 20.0)),
+        check("inverter.u_sw", "V", VOLTAGE, |d| d.inverter.as_mut()?.u_sw.as_mut(),
+            1.0 / u_dc, "its multiple of dc_link.u_dc", (0.03, 100.0)).map(|x| x.usual(0.3, 30.0)),
+        check("inverter.k_sw", "", &[], |d| d.inverter.as_mut()?.k_sw.as_mut(),
+            1.0, "an exponent of", (0.0, 3.0)),
+        check("inverter.f_sw", "Hz", FREQUENCY, |d| d.inverter.as_mut()?.f_sw.as_mut(),
+            1.0, "a switching frequency, in Hz,", (200.0, 2e6)),
+        check("inverter.E_sw", "J", ENERGY, |d| d.inverter.as_mut()?.E_sw.as_mut(),
+            frequency / switched, "the switching loss at f_sw over i_sw u_sw", (0.0, 0.3)).map(|x| x.usual(1e-6, 0.1)),
+        check("inverter.u_dead", "V", VOLTAGE, |d| d.inverter.as_mut()?.u_dead.as_mut(),
+            1.0 / u_dc, "its share of dc_link.u_dc", (0.0, 0.3)).map(|x| x.usual(1e-5, 0.1)),
+        check("inverter.i_zero", "A", CURRENT, |d| d.inverter.as_mut()?.i_zero.as_mut(),
+            1.0 / i, "its share of rating.current", (0.0, 1.0)).map(|x| x.usual(1e-4, 0.2)),
+        check("temperature.winding", "1/K", PER_KELVIN, |d| d.temperature.as_mut()?.winding.as_mut(),
+            1.0, "the growth of the resistance per kelvin", (0.0, 0.02)).map(|x| x.usual(5e-4, 0.01)).map(|x| x.remedy("copper has 3.93e-3")),
+        check("temperature.magnet", "1/K", PER_KELVIN, |d| d.temperature.as_mut()?.magnet.as_mut(),
+            1.0, "the growth of psi_M per kelvin", (-0.01, 1e-3)).map(|x| x.usual(-5e-3, -1e-4)).map(|x| x.remedy(MAGNET)),
+        check("flux_map.alpha", "1/K", PER_KELVIN, |d| d.flux_map.as_mut()?.alpha.as_mut(),
+            1.0, "the growth of psi_M per kelvin", (-0.01, 1e-3)).map(|x| x.usual(-5e-3, -1e-4)).map(|x| x.remedy(MAGNET)),
+        check("flux_map.temperature", "degC", &[], |d| d.flux_map.as_mut()?.temperature.as_mut(),
+            1.0, "the temperature of a magnet, in degC,", (-100.0, 250.0)).map(|x| x.remedy("from K, subtract 273.15")),
+        check("control.T_s", "s", TIME, |d| d.control.T_s.as_mut(),
+            1.0, "a sample period, in s,", (1e-6, 0.01)),
     ];
-    all.extend(top);
-    all
+    let drag_test = drag_test.into_iter().flat_map(|(at, [fastest, _], [speed, p])| {
+        let one = |name, unit, units, value, per_unit, what, range, usual| Check {
+            name,
+            unit,
+            units,
+            of: |_| None,
+            value,
+            at,
+            per_unit,
+            what,
+            range,
+            usual,
+            remedy: CORRECT.into(),
+        };
+        let multiple = "its multiple of the highest speed of [rating]";
+        [
+            one("a speed of iron.p", "rad/s", SPEED, fastest, 1.0 / top, multiple, (0.05, 4.0), (0.1, 2.0)),
+            one(
+                "a power of iron.p",
+                "W",
+                POWER,
+                p,
+                1.0 / (speed * torque),
+                "its torque over rating.torque",
+                (1e-4, 0.3),
+                (1e-3, 0.2),
+            ),
+        ]
+    });
+    found.into_iter().flatten().chain(drag_test).collect()
 }
 
 #[cfg(test)]
@@ -175,12 +300,70 @@ mod tests {
             ("u_dc = 540.0", "u_dc = 0.54", "0.54 kV would fit: write 540 V"),
             (
                 "u_dc = 540.0",
-                "u_dc = 1e6",
-                "dc_link.u_dc = 1000000 V makes a DC link, in V, 1000000, expected 1 to 10000: correct it",
+                "u_dc = 1e9",
+                "dc_link.u_dc = 1000000000 V makes a DC link, in V, 1000000000, expected 1 to 10000: correct it",
             ),
         ] {
             let error = refused(from, to);
             assert!(error.contains(message) && error.lines().count() == 1, "{error}");
         }
+    }
+
+    /// The value that differs from all others is named, not the first one of its ratio.
+    #[test]
+    fn another_value_may_be_the_wrong_one() {
+        for (to, message) in [
+            (
+                "current = 0.015",
+                ": machine.L_d = 0.036 H makes L i / psi_M at rating.current 0.0009908, expected 0.003 to 30: ",
+            ),
+            ("current = 0.015", ": rating.current: m.toml:18:11: 0.015 kA would fit: write 15 A"),
+            ("current = 15000.0", ": rating.current: m.toml:18:11: 15000 mA would fit: write 15 A"),
+        ] {
+            let error = refused("current = 15.0", to);
+            assert!(error.contains(message) && error.lines().count() == 1, "{error}");
+        }
+        // Two wrong values: the first one is judged alone.
+        let both = TEXT.replacen("L_q = 51e-3", "L_q = 51.0", 1);
+        let motor = MotorFile::parse(&both.replacen("L_d = 36e-3", "L_d = 36.0", 1), Path::new("m.toml")).unwrap();
+        let error = check(&motor).unwrap_err().to_string();
+        assert!(error.contains("machine.L_d = 36 H") && error.ends_with("36 mH would fit: write 0.036 H"), "{error}");
+    }
+
+    #[test]
+    fn every_section_is_judged() {
+        for (section, message) in [
+            (
+                "[iron]\np = [[500.0, 11.8], [1500.0, 53.4]]",
+                "a speed of iron.p = 1500 rad/s makes its multiple of the highest speed of \
+              [rating] 9.549, expected 0.05 to 4: 1500 rpm would fit: write 157.1 rad/s",
+            ),
+            ("[iron]\np = [[52.4, 0.0118], [157.1, 0.0534]]", "0.0534 kW would fit: write 53.4 W"),
+            (
+                "[inverter]\nu_transistor = 800.0",
+                "inverter.u_transistor = 800 V makes its share of dc_link.u_dc 1.481, expected 0 to 0.3: \
+              800 mV would fit: write 0.8 V",
+            ),
+            ("[inverter]\nr_diode = 60.0", "60 mOhm would fit: write 0.06 Ohm"),
+            ("[inverter]\nE_sw = 2.5\ni_sw = 15.0\nu_sw = 600.0", "2.5 mJ would fit: write 0.0025 J"),
+            ("[inverter]\nE_sw = 2.5e-3\ni_sw = 15000.0\nu_sw = 600.0", "15000 mA would fit: write 15 A"),
+            ("[inverter]\nE_sw = 2.5e-3\ni_sw = 15.0\nu_sw = 0.6", "0.6 kV would fit: write 600 V"),
+            ("[inverter]\nk_sw = 13.0", "inverter.k_sw = 13 makes an exponent of 13, expected 0 to 3"),
+            ("[inverter]\nf_sw = 10.0", "10 kHz would fit: write 10000 Hz"),
+            ("[inverter]\nu_dead = 5400.0", "5400 mV would fit: write 5.4 V"),
+            ("[inverter]\ni_zero = 300.0", "300 mA would fit: write 0.3 A"),
+            ("[temperature]\nwinding = 0.393", "0.393 %/K would fit: write 0.00393 1/K"),
+            ("[temperature]\nwinding = 3930.0", "3930 ppm/K would fit: write 0.00393 1/K"),
+            ("[temperature]\nmagnet = -0.11", "-0.11 %/K would fit: write -0.0011 1/K"),
+            ("[temperature]\nmagnet = 1.1e-3", "a magnet weakens as it warms: NdFeB has -1.1e-3"),
+            ("[control]\nT_s = 100.0", "100 us would fit: write 0.0001 s"),
+        ] {
+            let motor = MotorFile::parse(&format!("{TEXT}\n{section}\n"), Path::new("m.toml")).unwrap();
+            let error = check(&motor).unwrap_err().to_string();
+            assert!(error.contains(message) && error.lines().count() == 1, "{error}");
+        }
+        // An energy without its current and voltage is refused elsewhere, with its remedy.
+        let alone = MotorFile::parse(&format!("{TEXT}\n[inverter]\nE_sw = 2.5e-3\n"), Path::new("m.toml")).unwrap();
+        assert!(check(&alone).is_ok());
     }
 }
