@@ -13,6 +13,7 @@ mod begin;
 mod exchange;
 mod inputs;
 mod period;
+mod slip;
 #[cfg(test)]
 mod tests;
 
@@ -36,6 +37,7 @@ use drive_control::commissioning::IDENTIFIED;
 #[cfg(doc)]
 use drive_control::model::SensorlessController;
 use drive_control::signals::ControllerOutputs;
+use drive_control::start::StartState;
 use drive_control::tables::{self as control, ESTIMATES, STATUS, VOLTAGES};
 #[cfg(doc)]
 use drive_plant::PmsmPlant;
@@ -50,6 +52,7 @@ use fmu_core::{
 };
 use period::{MEANS, Period};
 use serde::{Deserialize, Serialize};
+use slip::Slip;
 
 /// Maximum number of samples in one communication step.
 const MAX_SAMPLES: f64 = 1e6;
@@ -97,6 +100,8 @@ pub struct PmsmDrive {
     overload: Happened,
     /// The angle of an imposed shaft beside its speed, over communication steps.
     following: Following,
+    /// The estimate beside the rotor, over communication steps.
+    slip: Slip,
 }
 
 /// Occurrence of a condition that is reported once, such as a load far above the torque of the drive.
@@ -214,6 +219,18 @@ impl PmsmDrive {
         let acts = limited && !pair.plant.model.parameters.mechanics.imposed;
         *overload = overload.followed_by(acts && (*tau_load > FAR * tau_max || *tau_load < FAR * tau_min));
     }
+
+    /// Watches the estimate after a step of `h` (s).
+    fn watch_estimate(&mut self, h: f64) {
+        let Pair { plant, controller, .. } = &self.pair;
+        let ControllerOutputs { start_state, enabled, theta_est, speed_est, .. } = controller.out;
+        if !enabled || start_state != StartState::Running {
+            self.slip = Slip::default();
+            return;
+        }
+        let faster = f64::from(plant.model.parameters.motor.n_p) * (speed_est - plant.out.speed);
+        self.slip.count(h, theta_est - plant.out.theta_e, faster);
+    }
 }
 
 impl Model for PmsmDrive {
@@ -233,7 +250,7 @@ impl Model for PmsmDrive {
 
     const ICON: Option<&'static str> = Some(include_str!("../icons/pmsm_drive.svg"));
 
-    const STATE_VERSION: u16 = 33;
+    const STATE_VERSION: u16 = 34;
 
     fn idle(&self, name: &str) -> Option<&'static str> {
         let (plant, controller) = (&self.pair.plant.model.parameters, &self.pair.controller.model.parameters);
@@ -287,6 +304,7 @@ impl Model for PmsmDrive {
         self.period = Period::new(self.pair.plant.out.powers);
         self.overload = Happened::default();
         self.following = Following::default();
+        self.slip = Slip::default();
         self.before = self.pair.plant.model.inputs.commanded();
         self.unsettled = self.begins_steadily() && !self.begin_steady();
         self.convert_limits();
@@ -376,6 +394,7 @@ impl Model for PmsmDrive {
         }
         pair.output();
         self.watch_load();
+        self.watch_estimate(step.h);
         Ok(())
     }
 }
@@ -423,6 +442,16 @@ impl Warns for PmsmDrive {
         plant.warn(log);
         self.derating.warn(log);
         self.following.warn(self.inputs.angle_shaft, self.inputs.speed_shaft, log);
+        if lock_lost < 1.0 && self.slip.is_lost() {
+            let speed_est = self.pair.controller.out.speed_est;
+            log.warn("slip", || {
+                format!(
+                    "the estimate has lost the rotor, and lock_lost = {lock_lost:.2} does not show it: the shaft turns at {speed} rad/s, \
+                     and speed_est = {speed_est} rad/s; the controller's data or bandwidths do not fit the plant, its inverter, temperature \
+                     or load"
+                )
+            });
+        }
         let controller = &self.pair.controller.model;
         match &self.calibration {
             Some(calibration) => controller.warn_with(log, self.inputs.tau_ref, calibration.limits),

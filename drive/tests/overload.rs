@@ -94,3 +94,38 @@ fn a_speed_beyond_the_voltage_is_reported() {
         }
     }
 }
+
+/// Whether the drive with this estimator says that it has lost the rotor, under a load (N.m) from 0.8 s on; blind: `lock_lost` reports
+/// nothing.
+fn slips(estimator: Kind, blind: bool, tau: f64) -> Option<String> {
+    let (mut block, mut now, mut said) = (Block::<PmsmDrive>::default(), Elapsed::ZERO, None);
+    let par = &mut block.model.pair.controller.model.parameters;
+    par.estimator = estimator;
+    if blind {
+        par.lock.time = 1e4;
+    }
+    block.initialize();
+    for k in 0..4000 {
+        let inputs = &mut block.model.inputs;
+        (inputs.speed_ref, inputs.tau_load) = (if k < 2000 { 100.0 } else { -100.0 }, if k < 800 { 0.0 } else { tau });
+        let step = Step { start: now, h: 1e-3 };
+        block.step(&step).unwrap();
+        now = step.end();
+        block.model.warn(&mut Warnings::to(&mut |(_, key, text): Said<'_>| {
+            if key == "slip" {
+                said.get_or_insert_with(text);
+            }
+        }));
+    }
+    said
+}
+
+#[test]
+fn a_rotor_that_the_controller_believes_to_have_is_reported() {
+    let said = slips(Kind::FluxObserver, true, 2.5).unwrap();
+    println!("{said}");
+    assert!(said.contains("the estimate has lost the rotor") && said.contains("speed_est = "), "{said}");
+    for estimator in [Kind::Rasmussen, Kind::VoltageModel, Kind::ExtendedEmf, Kind::KalmanFilter, Kind::Sensored] {
+        assert_eq!(slips(estimator, false, 1.0), None, "{estimator:?}");
+    }
+}

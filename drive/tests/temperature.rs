@@ -477,11 +477,15 @@ fn model_exchange_has_no_network() {
     assert!(fault.message().contains("T_winding_imposed = 1 K"), "{fault}");
 }
 
-/// Degrees Celsius instead of K, and degrees instead of rad: the run goes on, and the warning names both readings.
+/// Degrees Celsius instead of K, degrees instead of rad, percent instead of 1, mJ instead of J: the run goes on, and the warning names
+/// the value, mostly with both readings.
 #[test]
 fn values_in_another_unit_are_reported() {
     macro_rules! said {
-        ($model:ty, $drive:ident => $set:expr) => {{
+        ($model:ty, $drive:ident => $set:expr) => {
+            said!($model, $drive => $set, "80 deg", "80 K")
+        };
+        ($model:ty, $drive:ident => $set:expr, $text:literal, $other:literal) => {{
             let mut block = Block::<$model>::default();
             let $drive = &mut block.model;
             $set;
@@ -489,7 +493,7 @@ fn values_in_another_unit_are_reported() {
             block.step(&Step { start: Elapsed::ZERO, h: 1e-3 }).unwrap();
             let mut keys = Vec::new();
             block.model.warn(&mut Warnings::to(&mut |(_, key, text)| {
-                if text().contains("80 deg") || text().contains("80 K") {
+                if text().contains($text) || text().contains($other) {
                     keys.push(key);
                 }
             }));
@@ -510,6 +514,21 @@ fn values_in_another_unit_are_reported() {
     );
     assert_eq!(said!(PmsmDrive, m => (m.derating.used, m.derating.T_winding) = (true, 80.0)), ["limit.T_winding"]);
     assert_eq!(said!(PmsmDrive, m => m.pair.controller.model.parameters.theta_est = -180.0), ["initial.theta_est"]);
+    macro_rules! inverter {
+        ($model:ty, $drive:ident => $parameters:expr) => {
+            assert_eq!(
+                said!($model, $drive => $parameters.inverter.devices.E_sw = 25.0, "25 J in each", "25 J in each"),
+                ["inverter.E_sw"]
+            );
+            assert_eq!(
+                said!($model, $drive => $parameters.thermal.alpha_psi = 1.1e-3, "strengthens", "strengthens"),
+                ["magnet.alpha"]
+            );
+        };
+    }
+    inverter!(PmsmPlant, m => m.parameters);
+    inverter!(PmsmDrive, m => m.pair.plant.model.parameters);
+    inverter!(PmsmDriveMean, m => m.drive.plant);
     assert_eq!(said!(PmsmDriveMean, m => m.drive.plant.thermal.T_start = 80.0), ["thermal.T_start"]);
     assert_eq!(
         said!(PmsmDriveMean, m => (m.drive.derating.used, m.drive.derating.T_winding) = (true, 80.0)),

@@ -1,5 +1,6 @@
-//! Values that look like those of another unit: degrees instead of rad, degrees Celsius instead of K.
+//! Values that look like those of another unit: degrees instead of rad, degrees Celsius instead of K, percent instead of 1.
 
+use fmu_core::digits::rounded;
 use fmu_core::log::Warnings;
 use std::f64::consts::TAU;
 
@@ -22,6 +23,41 @@ pub fn temperature(name: &'static str, T: f64, log: &mut Warnings<'_>) {
     }
 }
 
+/// Growth per K of a resistance above which no winding is: five times that of copper.
+const GROWTH: f64 = 0.02;
+
+/// Loss per K of a flux linkage above which no magnet is: five times that of ferrite.
+const WEAKENING: f64 = 0.01;
+
+/// Warns of a temperature coefficient `alpha` (1/K) that no winding has.
+pub fn winding(name: &'static str, alpha: f64, log: &mut Warnings<'_>) {
+    if alpha > GROWTH {
+        log.warn(name, || {
+            format!("{name} = {alpha} 1/K: copper has 0.00393 1/K; {alpha} %/K is {} 1/K", rounded(0.01 * alpha, 6))
+        });
+    }
+}
+
+/// Warns of a temperature coefficient `alpha` (1/K) that no magnet has.
+pub fn magnet(name: &'static str, alpha: f64, log: &mut Warnings<'_>) {
+    if alpha > 1e-3 {
+        log.warn(name, || {
+            format!("{name} = {alpha} 1/K: the magnet strengthens as it warms; NdFeB weakens, by -0.0011 1/K")
+        });
+    } else if alpha < -WEAKENING {
+        log.warn(name, || {
+            format!("{name} = {alpha} 1/K: NdFeB has -0.0011 1/K; {alpha} %/K is {} 1/K", rounded(0.01 * alpha, 6))
+        });
+    }
+}
+
+/// Warns of a PWM period `T` (s) that no inverter has.
+pub fn period(name: &'static str, T: f64, log: &mut Warnings<'_>) {
+    if !(2e-7..=0.01).contains(&T) {
+        log.warn(name, || format!("{name} = {T} s is a switching frequency of {} Hz", rounded(1.0 / T, 4)));
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -40,6 +76,20 @@ mod tests {
         }
         for (T, said) in [(80.0, "T = 80 K is -193.15 degC; 80 degC is 353.15 K"), (233.15, ""), (450.0, "")] {
             assert_eq!(heard(|log| temperature("T", T, log)), said);
+        }
+        let percent = "alpha = 0.393 1/K: copper has 0.00393 1/K; 0.393 %/K is 0.00393 1/K";
+        for (alpha, said) in [(0.393, percent), (3.93e-3, ""), (0.0, "")] {
+            assert_eq!(heard(|log| winding("alpha", alpha, log)), said);
+        }
+        let sign = "alpha = 0.0011 1/K: the magnet strengthens as it warms; NdFeB weakens, by -0.0011 1/K";
+        let percent = "alpha = -0.11 1/K: NdFeB has -0.0011 1/K; -0.11 %/K is -0.0011 1/K";
+        for (alpha, said) in [(1.1e-3, sign), (-0.11, percent), (-2e-3, ""), (0.0, "")] {
+            assert_eq!(heard(|log| magnet("alpha", alpha, log)), said);
+        }
+        let (slow, fast) =
+            ("T = 0.1 s is a switching frequency of 10 Hz", "T = 0.0000001 s is a switching frequency of 10000000 Hz");
+        for (T, said) in [(0.1, slow), (1e-7, fast), (1e-4, ""), (5e-7, "")] {
+            assert_eq!(heard(|log| period("T", T, log)), said);
         }
     }
 }

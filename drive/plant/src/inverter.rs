@@ -10,6 +10,9 @@
 
 use crate::losses::conduction::{DEVICES, Devices};
 use crate::pwm::{InverterMode, Pwm};
+use drive_base::implausible;
+use fmu_core::digits::rounded;
+use fmu_core::log::Warnings;
 use fmu_core::unit::{AMPERE, SECOND};
 use fmu_core::{Part, Row, Table, table};
 use serde::{Deserialize, Serialize};
@@ -45,6 +48,27 @@ impl Inverter {
     /// Time in s between two instants at which the carrier takes over voltage references; `None` without a carrier.
     pub fn update_period(&self) -> Option<f64> {
         (self.pwm.mode == InverterMode::Switched).then(|| self.T_pwm / self.pwm.update.each_period())
+    }
+}
+
+/// Largest plausible switching loss, as a share of the power that is switched: tens of times that of real inverters.
+const LOST: f64 = 0.3;
+
+impl Inverter {
+    /// Warns of a PWM period and of a switching loss that no inverter has.
+    pub fn warn(&self, log: &mut Warnings<'_>) {
+        let &Self { T_pwm, devices: Devices { E_sw, i_sw, u_sw, .. }, .. } = self;
+        implausible::period("inverter.T_pwm", T_pwm, log);
+        let switched = i_sw * u_sw * T_pwm;
+        if E_sw > LOST * switched {
+            log.warn("inverter.E_sw", || {
+                format!(
+                    "inverter.E_sw = {E_sw} J in each inverter.T_pwm = {T_pwm} s is {} times the power inverter.i_sw inverter.u_sw = \
+                     {i_sw} A {u_sw} V, and a real inverter loses about a hundredth; give J, A, V and s",
+                    rounded(E_sw / switched, 3)
+                )
+            });
+        }
     }
 }
 

@@ -311,6 +311,7 @@ impl Warns for PmsmPlant {
         }
         implausible::angle("initial.theta_e", self.parameters.initial.theta_e, log);
         self.parameters.thermal.warn(&self.inputs.thermal, log);
+        self.parameters.inverter.warn(log);
         self.following.warn(self.inputs.angle_shaft, self.inputs.speed_shaft, log);
     }
 }

@@ -503,6 +503,7 @@ impl Warns for PmsmDriveMean {
         self.drive.derating.warn(log);
         let plant = &self.drive.plant;
         plant.thermal.warn(&self.inputs.thermal, log);
+        plant.inverter.warn(log);
         if !plant.is_linear() {
             let motor = plant.thermal.motor(&plant.motor, &self.temperatures());
             plant.magnetics().warn(&motor, self.point.psi, log);

@@ -37,7 +37,7 @@ impl Sides {
         }))
     }
 
-    /// Of each leg: for the dead-time voltage, and for the drop of the devices.
+    /// The sides of the legs: by the currents that determine the dead-time voltage, and by those that determine the drop of the devices.
     #[inline]
     pub(super) fn legs(self) -> [[i8; 3]; 2] {
         self.0

@@ -24,7 +24,7 @@ struct Signs {
 }
 
 impl Signs {
-    /// Of currents on these sides of the zone +-`zone` (A).
+    /// The signs of currents on these `sides` of the zone +-`zone` (A).
     fn of(sides: [i8; 3], zone: f64) -> Self {
         let [a, b, c] = sides.map(|side| if side == 0 { 1.0 / zone } else { 0.0 });
         Self { at_0: phases(sides), slope: Phases { a, b, c } }
@@ -43,7 +43,7 @@ pub struct InZone {
     /// Voltage of the legs with dead time in V, at the current in steady state.
     u: Affine,
     conduction: Option<Conduction<f64>>,
-    /// Of the currents that determine the drop of the devices.
+    /// The signs of the currents that determine the drop of the devices.
     signs: Signs,
     /// Switching loss in W per ampere.
     sw: f64,

@@ -94,8 +94,10 @@ impl Thermal {
         Motor { n_p, R_s: resistance * R_s, L_d, L_q, psi_M: magnet * psi_M }
     }
 
-    /// Warns of temperatures that look like degrees Celsius.
+    /// Warns of temperatures that look like degrees Celsius, and of coefficients that no material has.
     pub fn warn(&self, inputs: &ThermalInputs, log: &mut Warnings<'_>) {
+        implausible::winding("winding.alpha", self.alpha_R, log);
+        implausible::magnet("magnet.alpha", self.alpha_psi, log);
         let mut check = |name, T| implausible::temperature(name, T, log);
         check("thermal.T_ref", self.T_ref);
         match self.mode {
