@@ -128,18 +128,23 @@ mod tests {
         });
         // A process that is killed before it has created the lock, and unrelated folders.
         let temporary = |prefix| tempfile::Builder::new().prefix(prefix).tempdir().unwrap();
-        let (empty, full, of_probe) = (temporary("fmu-0-"), temporary("fmu-0-"), temporary("fmu-probe-"));
+        let (empty, of_probe) = (temporary("fmu-0-"), temporary("fmu-probe-"));
+        // Named as an unrelated folder until it is full: another process would remove it.
+        let full = temporary("full-");
         fs::write(full.path().join("x"), "").unwrap();
+        let named = full.path().with_file_name(format!("fmu-0-{}", process::id()));
+        fs::rename(full.keep(), &named).unwrap();
         let later = Folder::new().unwrap();
         assert!(
             paths.iter().all(|path| !path.exists())
                 && !empty.path().exists()
-                && full.path().is_dir()
+                && named.is_dir()
                 && of_probe.path().is_dir()
                 && used.path().is_dir()
                 && later.path().is_dir()
         );
         assert!(used.path().file_name().unwrap().to_string_lossy().starts_with(&format!("fmu-{}-", process::id())));
+        fs::remove_dir_all(named).unwrap();
     }
 
     #[test]
