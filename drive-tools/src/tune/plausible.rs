@@ -110,6 +110,7 @@ const FLUX_LINKAGE: Units = &[("mWb", 1e-3), ("uWb", 1e-6)];
 const TORQUE: Units = &[("mN.m", 1e-3), ("N.cm", 1e-2), ("kN.m", 1e3)];
 const INERTIA: Units = &[("kg.cm2", 1e-4), ("g.cm2", 1e-7), ("g.m2", 1e-3)];
 const ENERGY: Units = &[("mJ", 1e-3), ("uJ", 1e-6)];
+const FRICTION: Units = &[("mN.m.s/rad", 1e-3), ("N.m.s/deg", 180.0 / PI), ("N.m/rpm", 30.0 / PI)];
 const POWER: Units = &[("kW", 1e3), ("mW", 1e-3)];
 const FREQUENCY: Units = &[("kHz", 1e3), ("MHz", 1e6)];
 const TIME: Units = &[("ms", 1e-3), ("us", 1e-6)];
@@ -183,7 +184,7 @@ fn checks(data: &mut Data) -> Vec<Check> {
             speed / torque, "the time in s to rating.speed with rating.torque", (1e-4, 1e3)),
         check("rating.speed_max", "rad/s", SPEED, |d| d.rating.speed_max.as_mut(),
             1.0 / speed, "its multiple of rating.speed", (1.0, 10.0)),
-        check("mechanics.B", "N.m.s/rad", TORQUE, |d| d.mechanics.B.as_mut(),
+        check("mechanics.B", "N.m.s/rad", FRICTION, |d| d.mechanics.B.as_mut(),
             speed / torque, friction, (0.0, 1.0)).map(|x| x.usual(1e-6, 0.5)),
         check("mechanics.tau_coulomb", "N.m", TORQUE, |d| d.mechanics.tau_coulomb.as_mut(),
             1.0 / torque, friction, (0.0, 1.0)).map(|x| x.usual(1e-6, 0.5)),
@@ -296,6 +297,11 @@ mod tests {
             ("psi_M = 0.545", "psi_M = 545.0", "545 mWb would fit: write 0.545 Wb"),
             ("speed = 157.079633", "speed = 1500.0", "1500 rpm would fit: write 157.1 rad/s"),
             ("J = 15e-3", "J = 150.0", "150 kg.cm2 would fit: write 0.015 kg.m2"),
+            (
+                "J = 15e-3",
+                "J = 15e-3\nB = 5.0",
+                "B = 5 N.m.s/rad makes its torque at rating.speed, over rating.torque, 56.1, expected 0 to 1: 5 mN.m.s/rad would fit: write 0.005",
+            ),
             ("torque = 14.0", "torque = 14000.0", "14000 mN.m would fit: write 14 N.m"),
             ("u_dc = 540.0", "u_dc = 0.54", "0.54 kV would fit: write 540 V"),
             (
