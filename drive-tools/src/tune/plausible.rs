@@ -122,29 +122,68 @@ const MAGNET: &str = "a magnet weakens as it warms: NdFeB has -1.1e-3, SmCo -0.4
 /// Switching frequency in Hz where the file has none, for the judgment of an energy.
 const USUAL_FREQUENCY: f64 = 1e4;
 
+/// Advice on psi_M.
+fn of_kv(data: &Data) -> String {
+    let n_p = f64::from(*data.machine.n_p.get_ref());
+    format!(
+        "it is the peak value of a phase: from KV in rpm/V, 60 / (2 pi sqrt(3) n_p KV) with n_p = {n_p} pole pairs; for the EMF \
+         to reach u_dc / sqrt(3) at rating.speed, psi_M is {} Wb",
+        rounded(data.dc_link.u_dc.get_ref() / (3.0_f64.sqrt() * n_p * data.rating.speed.get_ref()), 4)
+    )
+}
+
+/// Advice on R_s.
+#[expect(non_snake_case, reason = "the symbols of the models")]
+fn of_current(data: &Data) -> String {
+    let (R_s, i, u_dc) = (data.machine.R_s.get_ref(), data.rating.current.get_ref(), data.dc_link.u_dc.get_ref());
+    let highest = u_dc / 3.0_f64.sqrt();
+    if i * R_s <= highest {
+        return CORRECT.into();
+    }
+    format!(
+        "rating.current = {i} A drops {} V across R_s, and a phase has at most u_dc / sqrt(3) = {} V: lower rating.current, a peak \
+         value, below {} A, or correct R_s, the resistance of one phase",
+        rounded(i * R_s, 4),
+        rounded(highest, 4),
+        rounded(0.6 * u_dc / R_s, 4)
+    )
+}
+
+/// The pairs of the drag test with the highest speed, and with the greatest torque.
+fn drag_test(data: &Data) -> Vec<Check> {
+    let Some(iron) = &data.iron else { return Vec::new() };
+    let most = |of: fn(&[f64; 2]) -> f64| iron.p.get_ref().iter().copied().max_by(|a, b| of(a).total_cmp(&of(b)));
+    let (Some([fastest, _]), Some([speed, p])) = (most(|[speed, _]| *speed), most(|[speed, p]| p / speed)) else {
+        return Vec::new();
+    };
+    let check = |name, unit, units, value, per_unit, what, range, usual| Check {
+        name,
+        unit,
+        units,
+        of: |_| None,
+        value,
+        at: iron.p.span().start,
+        per_unit,
+        what,
+        range,
+        usual,
+        remedy: CORRECT.into(),
+    };
+    let (multiple, of_top) = ("its multiple of the highest speed of [rating]", 1.0 / data.rating.top());
+    let (share, of_torque) = ("its torque over rating.torque", 1.0 / (speed * data.rating.torque.get_ref()));
+    vec![
+        check("a speed of iron.p", "rad/s", SPEED, fastest, of_top, multiple, (0.05, 4.0), (0.1, 2.0)),
+        check("a power of iron.p", "W", POWER, p, of_torque, share, (1e-4, 0.3), (1e-3, 0.2)),
+    ]
+}
+
 fn checks(data: &mut Data) -> Vec<Check> {
     let (machine, rating) = (&data.machine, &data.rating);
     let of = |x: &Located| *x.get_ref();
     let (n_p, psi_M, i, u_dc) =
         (f64::from(*machine.n_p.get_ref()), of(&machine.psi_M), of(&rating.current), of(&data.dc_link.u_dc));
-    let (speed, torque, top) = (of(&rating.speed), of(&rating.torque), rating.top());
-    let of_kv = format!(
-        "it is the peak value of a phase: from KV in rpm/V, 60 / (2 pi sqrt(3) n_p KV) with n_p = {n_p} pole pairs; for the EMF \
-         to reach u_dc / sqrt(3) at rating.speed, psi_M is {} Wb",
-        rounded(u_dc / (3.0_f64.sqrt() * n_p * speed), 4)
-    );
-    let (R_s, highest) = (of(&machine.R_s), u_dc / 3.0_f64.sqrt());
-    let of_current = if i * R_s > highest {
-        format!(
-            "rating.current = {i} A drops {} V across R_s, and a phase has at most u_dc / sqrt(3) = {} V: lower rating.current, a peak \
-             value, below {} A, or correct R_s, the resistance of one phase",
-            rounded(i * R_s, 4),
-            rounded(highest, 4),
-            rounded(0.6 * u_dc / R_s, 4)
-        )
-    } else {
-        CORRECT.into()
-    };
+    let (speed, torque) = (of(&rating.speed), of(&rating.torque));
+    let (of_kv, of_current) = (of_kv(data), of_current(data));
     let saliency = (of(&machine.L_q) - of(&machine.L_d)).abs();
     let emf = n_p * 3.0_f64.sqrt() / u_dc;
     let part = |x: Option<&Located>| x.map_or(f64::NAN, of);
@@ -152,12 +191,6 @@ fn checks(data: &mut Data) -> Vec<Check> {
     let switched = part(inverter.and_then(|x| x.i_sw.as_ref())) * part(inverter.and_then(|x| x.u_sw.as_ref()));
     let frequency = inverter.and_then(|x| x.f_sw.as_ref()).map_or(USUAL_FREQUENCY, of);
     let friction = "its torque at rating.speed, over rating.torque,";
-    // The pairs of the drag test with the highest speed, and with the greatest torque.
-    let drag_test = data.iron.as_ref().and_then(|iron| {
-        let most = |of: fn(&[f64; 2]) -> f64| iron.p.get_ref().iter().copied().max_by(|a, b| of(a).total_cmp(&of(b)));
-        Some((iron.p.span().start, most(|[speed, _]| *speed)?, most(|[speed, p]| p / speed)?))
-    });
-
     let mut check = |name, unit, units, of: fn(&mut Data) -> Option<&mut Located>, per_unit, what, range| {
         let (value, at) = of(data).map(|x| (*x.get_ref(), x.span().start))?;
         Some(Check { name, unit, units, of, value, at, per_unit, what, range, usual: range, remedy: CORRECT.into() })
@@ -225,36 +258,7 @@ fn checks(data: &mut Data) -> Vec<Check> {
         check("control.T_s", "s", TIME, |d| d.control.T_s.as_mut(),
             1.0, "a sample period, in s,", (1e-6, 0.01)),
     ];
-    let drag_test = drag_test.into_iter().flat_map(|(at, [fastest, _], [speed, p])| {
-        let one = |name, unit, units, value, per_unit, what, range, usual| Check {
-            name,
-            unit,
-            units,
-            of: |_| None,
-            value,
-            at,
-            per_unit,
-            what,
-            range,
-            usual,
-            remedy: CORRECT.into(),
-        };
-        let multiple = "its multiple of the highest speed of [rating]";
-        [
-            one("a speed of iron.p", "rad/s", SPEED, fastest, 1.0 / top, multiple, (0.05, 4.0), (0.1, 2.0)),
-            one(
-                "a power of iron.p",
-                "W",
-                POWER,
-                p,
-                1.0 / (speed * torque),
-                "its torque over rating.torque",
-                (1e-4, 0.3),
-                (1e-3, 0.2),
-            ),
-        ]
-    });
-    found.into_iter().flatten().chain(drag_test).collect()
+    found.into_iter().flatten().chain(drag_test(data)).collect()
 }
 
 #[cfg(test)]

@@ -147,16 +147,16 @@ impl Drops<f64> for OneSided {
 }
 
 #[cfg(test)]
-mod tests {
+pub(super) mod tests {
     use super::*;
     use crate::inverter::Gates;
     use crate::legs::Legs;
     use crate::losses::conduction::Devices;
-    use crate::losses::flow::Path;
+    use crate::losses::flow::{Flow, Path};
     use crate::tables::PlantParameters;
 
-    #[test]
-    fn beyond_the_zone_the_signs_say_what_the_currents_say() {
+    /// A plant with every loss.
+    pub(crate) fn lossy() -> PlantParameters {
         let mut par = PlantParameters::default();
         (par.iron.G_e, par.iron.G_h, par.winding.k_ac) = (2e-4, 0.1, 1e-7);
         par.inverter.dead_time = 2e-6;
@@ -168,6 +168,20 @@ mod tests {
             E_sw: 1e-3,
             ..Devices::default()
         };
+        par
+    }
+
+    /// Compares both at the current `i` (A).
+    pub(crate) fn assert_near(got: &Flow<f64>, wanted: &Flow<f64>, i: AlphaBeta) {
+        let near = |a: f64, b: f64| (a - b).abs() < 1e-12 * (1.0 + b.abs());
+        assert!((got.i - wanted.i).magnitude() < 1e-13 && (got.d_psi - wanted.d_psi).magnitude() < 1e-12, "{i:?}");
+        assert!(near(got.p_in, wanted.p_in) && near(got.losses.cond, wanted.losses.cond), "{i:?}");
+        assert!(near(got.losses.sw, wanted.losses.sw) && near(got.losses.iron, wanted.losses.iron), "{i:?}");
+    }
+
+    #[test]
+    fn beyond_the_zone_the_signs_say_what_the_currents_say() {
+        let par = lossy();
         let switches = Switches::new(&par.inverter, Gates::Switch, 325.0, Legs::switching(&par.inverter, 325.0));
         let (u, w) = (AlphaBeta::new(70.0, -90.0), 300.0);
         let dissipation = par.dissipation(2.0, w);
@@ -179,10 +193,7 @@ mod tests {
             let drops = switches.one_sided(u, &sides);
             let got = Path { u, dissipation, drops }.flow(AlphaBeta::ZERO, i, w);
             let wanted = Path { u, dissipation, drops: switches }.flow(AlphaBeta::ZERO, i, w);
-            let near = |a: f64, b: f64| (a - b).abs() < 1e-12 * (1.0 + b.abs());
-            assert!((got.i - wanted.i).magnitude() < 1e-13 && (got.d_psi - wanted.d_psi).magnitude() < 1e-12, "{i:?}");
-            assert!(near(got.p_in, wanted.p_in) && near(got.losses.cond, wanted.losses.cond), "{i:?}");
-            assert!(near(got.losses.sw, wanted.losses.sw) && near(got.losses.iron, wanted.losses.iron), "{i:?}");
+            assert_near(&got, &wanted, i);
         }
     }
 

@@ -88,21 +88,13 @@ mod tests {
     use crate::legs::Legs;
     use crate::losses::conduction::Devices;
     use crate::losses::flow::Path;
-    use crate::tables::PlantParameters;
+    use crate::losses::sides::tests::{assert_near, lossy};
 
     #[test]
     fn on_their_sides_the_currents_have_the_voltages_of_the_switches() {
-        let mut par = PlantParameters::default();
-        (par.iron.G_e, par.iron.G_h, par.winding.k_ac) = (2e-4, 0.1, 1e-7);
+        let mut par = lossy();
         par.inverter.i_zero = 0.5;
-        let devices = Devices {
-            u_transistor: 0.9,
-            r_transistor: 0.06,
-            u_diode: 0.7,
-            r_diode: 0.05,
-            E_sw: 1e-3,
-            ..Devices::default()
-        };
+        let devices = par.inverter.devices.clone();
         let (u, w) = (AlphaBeta::new(70.0, -90.0), 300.0);
         let dissipation = par.dissipation(2.0, w);
         let mut inside = [0; 4];
@@ -117,14 +109,7 @@ mod tests {
                 inside[sides.legs()[0].iter().filter(|&&side| side == 0).count()] += 1;
                 let drops = switches.in_zone(u, &sides).unwrap();
                 let got = Path { u, dissipation, drops }.flow(AlphaBeta::ZERO, i, w);
-                let wanted = wanted.flow(AlphaBeta::ZERO, i, w);
-                let near = |a: f64, b: f64| (a - b).abs() < 1e-12 * (1.0 + b.abs());
-                assert!(
-                    (got.i - wanted.i).magnitude() < 1e-13 && (got.d_psi - wanted.d_psi).magnitude() < 1e-12,
-                    "{i:?}"
-                );
-                assert!(near(got.p_in, wanted.p_in) && near(got.losses.cond, wanted.losses.cond), "{i:?}");
-                assert!(near(got.losses.sw, wanted.losses.sw) && near(got.losses.iron, wanted.losses.iron), "{i:?}");
+                assert_near(&got, &wanted.flow(AlphaBeta::ZERO, i, w), i);
             }
         }
         assert!(inside.iter().all(|&count| count > 4), "legs inside the zone: {inside:?}");
