@@ -41,8 +41,9 @@ impl Check {
     }
 
     fn passes(&self) -> bool {
-        // Without the values it is compared with, there is no ratio.
-        self.judged().is_nan() || (self.range.0..=self.range.1).contains(&self.judged())
+        // Without the values it is compared with, there is no ratio; a negative value is refused by the parameter's own range.
+        let (judged, (low, high)) = (self.judged(), self.range);
+        judged.is_nan() || (low == 0.0 && judged < 0.0) || (low..=high).contains(&judged)
     }
 
     /// Whether the value, in a unit of this `size`, is a usual one.

@@ -6,7 +6,7 @@
 //! Correction to the paper: (11) contains w_r, not the printed speed estimate.
 //!
 //! Limits: the calculated EMF includes L p i, and therefore the current loop's voltage noise and each load change. It
-//! holds rated load down to 0.020 of the rated speed, 0.030 with a compensated dead time. A reversal at light load is
+//! holds rated load down to 0.020 of the rated speed, 0.020 with a compensated dead time. A reversal at light load is
 //! ambiguous by half a turn, unless `emf.hold_reversal` holds it.
 
 use crate::estimator::contract::{ContextOf, Estimate, Estimating, Sample, SetupOf};
