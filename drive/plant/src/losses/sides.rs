@@ -109,7 +109,7 @@ impl Switches {
     }
 
     /// Allowed excess (A) of the currents of [`Sides`] over their edges at the end of a step: where the voltage that depends on
-    /// them is off by [`TOLERANCE`] of the whole.
+    /// them is off by `TOLERANCE` of the whole.
     #[inline(never)]
     pub fn tolerances(&self) -> [f64; 2] {
         let zone = self.legs.i_zone();
