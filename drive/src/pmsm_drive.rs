@@ -446,8 +446,8 @@ impl Warns for PmsmDrive {
             let speed_est = self.pair.controller.out.speed_est;
             log.warn("slip", || {
                 format!(
-                    "the estimate has lost the rotor, and lock_lost = {lock_lost:.2} does not show it: the shaft turns at {speed} rad/s, \
-                     and speed_est = {speed_est} rad/s; the controller's data or bandwidths do not fit the plant, its inverter, temperature \
+                    "the estimate has lost the rotor, and lock_lost = {lock_lost:.2} does not show it: the shaft turns at {speed:.1} rad/s, \
+                     and speed_est = {speed_est:.1} rad/s; the controller's data or bandwidths do not fit the plant, its inverter, temperature \
                      or load"
                 )
             });
