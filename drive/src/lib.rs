@@ -26,7 +26,7 @@ pub mod steady;
 mod terminals;
 pub mod torque;
 
-pub use drive_base::{frame, integrate, math, modulation, motor, overmodulation};
+pub use drive_base::{frame, implausible, integrate, math, modulation, motor, overmodulation};
 pub use drive_control::clocked::SensorlessControllerClocked;
 pub use drive_control::model::SensorlessController;
 pub use drive_control::{self as control, estimator};

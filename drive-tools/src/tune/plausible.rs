@@ -9,13 +9,15 @@
 
 use super::motor::{Data, Located, MotorFile};
 use crate::error::{Result, bail};
+use drive::implausible::{MAGNET, PERIOD, WINDING};
+use drive::plant::inverter::LOST;
 use fmu_core::digits::rounded;
 use std::f64::consts::PI;
 
 /// Other units in which a value may have been written, with their size in the expected unit.
 type Units = &'static [(&'static str, f64)];
 
-/// A value, its position, and the ratio by which it is judged.
+/// A value, its position, and the ratio that shows whether it is plausible.
 struct Check {
     name: &'static str,
     unit: &'static str,
@@ -25,7 +27,7 @@ struct Check {
     value: f64,
     /// Position in the file.
     at: usize,
-    /// The judged quantity per unit of the value; it is proportional to the value.
+    /// The ratio per unit of the value; it is proportional to the value.
     per_unit: f64,
     what: &'static str,
     range: (f64, f64),
@@ -36,19 +38,19 @@ struct Check {
 }
 
 impl Check {
-    fn judged(&self) -> f64 {
+    fn ratio(&self) -> f64 {
         self.value * self.per_unit
     }
 
     fn passes(&self) -> bool {
         // Without the values it is compared with, there is no ratio; a negative value is refused by the parameter's own range.
-        let (judged, (low, high)) = (self.judged(), self.range);
-        judged.is_nan() || (low == 0.0 && judged < 0.0) || (low..=high).contains(&judged)
+        let (ratio, (low, high)) = (self.ratio(), self.range);
+        ratio.is_nan() || (low == 0.0 && ratio < 0.0) || (low..=high).contains(&ratio)
     }
 
     /// Whether the value, in a unit of this `size`, is a usual one.
     fn fits(&self, size: f64) -> bool {
-        (self.usual.0..=self.usual.1).contains(&(self.judged() * size))
+        (self.usual.0..=self.usual.1).contains(&(self.ratio() * size))
     }
 
     /// Whether all values are plausible once this one is converted from a unit of this `size`.
@@ -97,7 +99,7 @@ pub fn check(motor: &MotorFile) -> Result<()> {
         "{}: {name} = {} makes {what} {}, expected {low} to {high}: {}",
         motor.place_at(failed.at),
         format!("{value} {unit}").trim_end(),
-        rounded(failed.judged(), 4),
+        rounded(failed.ratio(), 4),
         suggestion.as_ref().unwrap_or(remedy)
     )
 }
@@ -118,7 +120,7 @@ const TIME: Units = &[("ms", 1e-3), ("us", 1e-6)];
 const PER_KELVIN: Units = &[("%/K", 1e-2), ("ppm/K", 1e-6)];
 
 const CORRECT: &str = "correct it, or the values it is compared with";
-const MAGNET: &str = "a magnet weakens as it warms: NdFeB has -1.1e-3, SmCo -0.4e-3, ferrite -2e-3";
+const WEAKENS: &str = "a magnet weakens as it warms: NdFeB has -1.1e-3, SmCo -0.4e-3, ferrite -2e-3";
 
 /// Switching frequency in Hz where the file has none, for the judgment of an energy.
 const USUAL_FREQUENCY: f64 = 1e4;
@@ -241,19 +243,19 @@ fn checks(data: &mut Data) -> Vec<Check> {
         check("inverter.k_sw", "", &[], |d| d.inverter.as_mut()?.k_sw.as_mut(),
             1.0, "an exponent of", (0.0, 3.0)),
         check("inverter.f_sw", "Hz", FREQUENCY, |d| d.inverter.as_mut()?.f_sw.as_mut(),
-            1.0, "a switching frequency, in Hz,", (200.0, 2e6)),
+            1.0, "a switching frequency, in Hz,", (1.0 / PERIOD.1, 1.0 / PERIOD.0)),
         check("inverter.E_sw", "J", ENERGY, |d| d.inverter.as_mut()?.E_sw.as_mut(),
-            frequency / switched, "the switching loss at f_sw over i_sw u_sw", (0.0, 0.3)).map(|x| x.usual(1e-6, 0.1)),
+            frequency / switched, "the switching loss at f_sw over i_sw u_sw", (0.0, LOST)).map(|x| x.usual(1e-6, 0.1)),
         check("inverter.u_dead", "V", VOLTAGE, |d| d.inverter.as_mut()?.u_dead.as_mut(),
             1.0 / u_dc, "its share of dc_link.u_dc", (0.0, 0.3)).map(|x| x.usual(1e-5, 0.1)),
         check("inverter.i_zero", "A", CURRENT, |d| d.inverter.as_mut()?.i_zero.as_mut(),
             1.0 / i, "its share of rating.current", (0.0, 1.0)).map(|x| x.usual(1e-4, 0.2)),
         check("temperature.winding", "1/K", PER_KELVIN, |d| d.temperature.as_mut()?.winding.as_mut(),
-            1.0, "the growth of the resistance per kelvin", (0.0, 0.02)).map(|x| x.usual(5e-4, 0.01)).map(|x| x.remedy("copper has 3.93e-3")),
+            1.0, "the growth of the resistance per kelvin", WINDING).map(|x| x.usual(5e-4, 0.01)).map(|x| x.remedy("copper has 3.93e-3")),
         check("temperature.magnet", "1/K", PER_KELVIN, |d| d.temperature.as_mut()?.magnet.as_mut(),
-            1.0, "the growth of psi_M per kelvin", (-0.01, 1e-3)).map(|x| x.usual(-5e-3, -1e-4)).map(|x| x.remedy(MAGNET)),
+            1.0, "the growth of psi_M per kelvin", MAGNET).map(|x| x.usual(-5e-3, -1e-4)).map(|x| x.remedy(WEAKENS)),
         check("flux_map.alpha", "1/K", PER_KELVIN, |d| d.flux_map.as_mut()?.alpha.as_mut(),
-            1.0, "the growth of psi_M per kelvin", (-0.01, 1e-3)).map(|x| x.usual(-5e-3, -1e-4)).map(|x| x.remedy(MAGNET)),
+            1.0, "the growth of psi_M per kelvin", MAGNET).map(|x| x.usual(-5e-3, -1e-4)).map(|x| x.remedy(WEAKENS)),
         check("flux_map.temperature", "degC", &[], |d| d.flux_map.as_mut()?.temperature.as_mut(),
             1.0, "the temperature of a magnet, in degC,", (-100.0, 250.0)).map(|x| x.remedy("from K, subtract 273.15")),
         check("control.T_s", "s", TIME, |d| d.control.T_s.as_mut(),
@@ -334,7 +336,7 @@ mod tests {
             let error = refused("current = 15.0", to);
             assert!(error.contains(message) && error.lines().count() == 1, "{error}");
         }
-        // Two wrong values: the first one is judged alone.
+        // If two values are wrong, no single conversion makes the file plausible, and the error suggests a unit for the first one.
         let both = TEXT.replacen("L_q = 51e-3", "L_q = 51.0", 1);
         let motor = MotorFile::parse(&both.replacen("L_d = 36e-3", "L_d = 36.0", 1), Path::new("m.toml")).unwrap();
         let error = check(&motor).unwrap_err().to_string();
@@ -342,7 +344,7 @@ mod tests {
     }
 
     #[test]
-    fn every_section_is_judged() {
+    fn every_section_is_checked() {
         for (section, message) in [
             (
                 "[iron]\np = [[500.0, 11.8], [1500.0, 53.4]]",

@@ -23,15 +23,18 @@ pub fn temperature(name: &'static str, T: f64, log: &mut Warnings<'_>) {
     }
 }
 
-/// Growth per K of a resistance above which no winding is: five times that of copper.
-const GROWTH: f64 = 0.02;
+/// Temperature coefficients (1/K) of a winding: up to five times that of copper.
+pub const WINDING: (f64, f64) = (0.0, 0.02);
 
-/// Loss per K of a flux linkage above which no magnet is: five times that of ferrite.
-const WEAKENING: f64 = 0.01;
+/// Temperature coefficients (1/K) of a magnet: from five times that of ferrite to a constant flux linkage.
+pub const MAGNET: (f64, f64) = (-0.01, 1e-3);
+
+/// PWM periods (s) of inverters.
+pub const PERIOD: (f64, f64) = (2e-7, 0.01);
 
 /// Warns of a temperature coefficient `alpha` (1/K) that no winding has.
 pub fn winding(name: &'static str, alpha: f64, log: &mut Warnings<'_>) {
-    if alpha > GROWTH {
+    if alpha > WINDING.1 {
         log.warn(name, || {
             format!("{name} = {alpha} 1/K: copper has 0.00393 1/K; {alpha} %/K is {} 1/K", rounded(0.01 * alpha, 6))
         });
@@ -40,11 +43,11 @@ pub fn winding(name: &'static str, alpha: f64, log: &mut Warnings<'_>) {
 
 /// Warns of a temperature coefficient `alpha` (1/K) that no magnet has.
 pub fn magnet(name: &'static str, alpha: f64, log: &mut Warnings<'_>) {
-    if alpha > 1e-3 {
+    if alpha > MAGNET.1 {
         log.warn(name, || {
             format!("{name} = {alpha} 1/K: the magnet strengthens as it warms; NdFeB weakens, by -0.0011 1/K")
         });
-    } else if alpha < -WEAKENING {
+    } else if alpha < MAGNET.0 {
         log.warn(name, || {
             format!("{name} = {alpha} 1/K: NdFeB has -0.0011 1/K; {alpha} %/K is {} 1/K", rounded(0.01 * alpha, 6))
         });
@@ -53,7 +56,7 @@ pub fn magnet(name: &'static str, alpha: f64, log: &mut Warnings<'_>) {
 
 /// Warns of a PWM period `T` (s) that no inverter has.
 pub fn period(name: &'static str, T: f64, log: &mut Warnings<'_>) {
-    if !(2e-7..=0.01).contains(&T) {
+    if !(PERIOD.0..=PERIOD.1).contains(&T) {
         log.warn(name, || format!("{name} = {T} s is a switching frequency of {} Hz", rounded(1.0 / T, 4)));
     }
 }

@@ -52,7 +52,7 @@ impl Inverter {
 }
 
 /// Largest plausible switching loss, as a share of the power that is switched: tens of times that of real inverters.
-const LOST: f64 = 0.3;
+pub const LOST: f64 = 0.3;
 
 impl Inverter {
     /// Warns of a PWM period and of a switching loss that no inverter has.
