@@ -14,6 +14,7 @@ pub mod datasheet;
 pub mod error;
 pub mod identify;
 pub mod map;
+mod plausible;
 pub mod queue;
 pub mod text_table;
 pub mod tune;

@@ -271,6 +271,50 @@ fn the_example_gives_its_own_points() {
     assert!(sheet.notes.iter().any(|note| note.contains("generator")), "{:?}", sheet.notes);
 }
 
+/// Odd losses are kept, with a warning.
+#[test]
+fn odd_losses_are_reported() {
+    let example = fs::read_to_string(root().join("src/commands/datasheet.toml")).unwrap();
+    let dir = tempfile::tempdir().unwrap();
+    let path = dir.path().join("sheet.toml");
+    for (from, to, note) in [
+        (
+            "[0.86, 0.93, 0.93",
+            "[0.86, 0.39, 0.93",
+            "at 2000 rpm, the losses fall from 6552 W at 20 N.m to 630.6 W at 40 N.m",
+        ),
+        (
+            "[0.82, 0.93, 0.95",
+            "[0.82, 0.93, 0.995",
+            "at 6000 rpm, the losses fall from 945.9 W at 20 N.m to 126.3 W at 40 N.m",
+        ),
+        (
+            "610, 1130]",
+            "610, 370]",
+            "losses.no_load is 370 W at 8000 rpm, but 1251 W at 5 N.m and 1657 W at 20 N.m lead to 1224 W",
+        ),
+        ("320, 610, 1130]", "500, 1000, 370]", "no_load is 500 W at 4000 rpm, but 369.6 W at 5 N.m"),
+        ("320, 610, 1130]", "500, 1000, 370]", "; 2 other speeds are odd, too"),
+        (
+            "0.75, 0.9, 1.2]",
+            "0.75, 1.9, 1.2]",
+            "torque.drag = 1.9 N.m at 6000 rpm takes 1194 W with the gates off, but the drive loses 610 W",
+        ),
+        (
+            "0.4, 0.6, 0.75, 0.9, 1.2]",
+            "0.0004, 0.0006, 0.00075, 0.0009, 0.0012]",
+            "torque.drag = 0.0006 N.m at 3000 rpm takes 0.1885 W",
+        ),
+        ("J = 0.02", "J = 0.03", ""),
+    ] {
+        assert!(example.contains(from), "{from}");
+        fs::write(&path, example.replacen(from, to, 1)).unwrap();
+        let notes = datasheet::read(&path).unwrap().doubts;
+        assert_eq!(notes.is_empty(), note.is_empty(), "{notes:?}");
+        assert!(note.is_empty() || notes.iter().any(|said| said.contains(note)), "{notes:?} instead of {note}");
+    }
+}
+
 #[test]
 fn what_is_wrong_is_named() {
     let example = fs::read_to_string(root().join("src/commands/datasheet.toml")).unwrap();

@@ -23,10 +23,12 @@ pub(crate) fn tune(
     gate(|| py.detach(values).map(|values| values.to_string()).map_err(|e| plain(&format!("{e:#}"))))
 }
 
-/// The values of `MappedDrive` for a data sheet as JSON.
+/// The values of `MappedDrive` for a data sheet as JSON, and its doubts.
 #[pyfunction]
 #[expect(clippy::needless_pass_by_value, reason = "PyO3 extracts values")]
-pub(crate) fn datasheet(py: Python<'_>, path: PathBuf) -> PyResult<String> {
+pub(crate) fn datasheet(py: Python<'_>, path: PathBuf) -> PyResult<(String, Vec<String>)> {
     let values = || drive_tools::datasheet::values(&path);
-    gate(|| py.detach(values).map(|values| values.to_string()).map_err(|e| plain(&format!("{e:#}"))))
+    gate(|| {
+        py.detach(values).map(|(values, doubts)| (values.to_string(), doubts)).map_err(|e| plain(&format!("{e:#}")))
+    })
 }

@@ -91,5 +91,8 @@ def test_from_datasheet(tmp_path):
     sheet.write_text(example.replace("0.86, 0.84", "86, 0.84"))
     with pytest.raises(FmuError, match="drive.toml: losses.efficiency.* is greater than 1"):
         drives.from_datasheet(sheet)
+    sheet.write_text(example.replace("610, 1130]", "610, 370]"))
+    with pytest.warns(UserWarning, match="losses.no_load is 370 W at 8000 rpm"):
+        drives.from_datasheet(sheet)
     with pytest.raises(ValueError, match="fmi must be 2 or 3, not 1"):
         drives.from_datasheet(sheet, fmi=1)

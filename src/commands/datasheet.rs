@@ -56,7 +56,9 @@ pub fn run(args: &Datasheet) -> Result<()> {
     }
     let path = args.sheet.as_ref().context("SHEET.toml is missing")?;
     if args.json {
-        println!("{:#}", datasheet::values(path)?);
+        let (values, doubts) = datasheet::values(path)?;
+        println!("{values:#}");
+        doubts.iter().for_each(|doubt| message::warning(doubt));
         return Ok(());
     }
     let sheet = datasheet::read(path)?;
@@ -75,6 +77,7 @@ pub fn run(args: &Datasheet) -> Result<()> {
     };
     print!("{}", text(&sheet));
     sheet.notes.iter().for_each(|note| message::note(note));
+    sheet.doubts.iter().for_each(|doubt| message::warning(doubt));
     println!("\n{}", file.display());
     Ok(())
 }
@@ -107,8 +110,8 @@ fn text(sheet: &MappedSheet) -> String {
         rounded(100.0 * efficiency, 4),
         rpm(n),
         rounded(tau, 4),
-        map.u_dc,
-        map.u_min,
-        map.u_max
+        rounded(map.u_dc, 4),
+        rounded(map.u_min, 4),
+        rounded(map.u_max, 4)
     )
 }

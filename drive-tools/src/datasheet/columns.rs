@@ -1,5 +1,6 @@
 //! The columns of the tables, at every speed that the data sheet or its map has.
 
+use super::Remarks;
 use super::column::SpeedColumn;
 use super::file::{DataSheet, RPM, Torque};
 use super::losses::{LossGrid, between};
@@ -7,17 +8,18 @@ use crate::csv::Columns;
 use crate::error::{Error, Result, WithContext, bail, ensure};
 use crate::map::request::ZERO_CELSIUS;
 use drive::mapped_drive::map::{SHARES, SPEEDS, share};
+use fmu_core::digits::rounded;
 
 /// The columns of a map that are read.
 const MAP: [&str; 8] = ["speed", "torque", "u_dc", "T_winding", "p_in", "p_mech", "p_iron", "p_friction"];
 
-/// The columns of a data sheet, with increasing speeds from 0 on, and notes.
+/// The columns of a data sheet, with increasing speeds from 0 on, and remarks.
 ///
 /// # Errors
 /// A value that is wrong, or curves that do not fit the losses.
-pub fn of(sheet: &DataSheet) -> Result<(Vec<SpeedColumn>, Vec<String>)> {
+pub fn of(sheet: &DataSheet) -> Result<(Vec<SpeedColumn>, Remarks)> {
     let named =
-        |result: Result<(Vec<SpeedColumn>, Vec<String>)>| result.with_context(|| sheet.path().display().to_string());
+        |result: Result<(Vec<SpeedColumn>, Remarks)>| result.with_context(|| sheet.path().display().to_string());
     match &sheet.data.losses.file {
         Some(file) => {
             let file = sheet.beside(file);
@@ -25,10 +27,10 @@ pub fn of(sheet: &DataSheet) -> Result<(Vec<SpeedColumn>, Vec<String>)> {
             let text = std::fs::read_to_string(&file)
                 .with_context(|| format!("{}: losses.file = {shown}", sheet.path().display()))?;
             let map = Columns::parse_some(&text, &shown, |name| MAP.contains(&name))?;
-            let (columns, notes) = of_map(sheet, &map)?;
+            let (columns, said) = of_map(sheet, &map)?;
             match &sheet.data.torque {
-                Some(torque) => named(with_torque(torque, &columns, notes)),
-                None => Ok((columns, notes)),
+                Some(torque) => named(with_torque(torque, &columns, said)),
+                None => Ok((columns, said)),
             }
         }
         None => named(of_table(sheet)),
@@ -36,8 +38,8 @@ pub fn of(sheet: &DataSheet) -> Result<(Vec<SpeedColumn>, Vec<String>)> {
 }
 
 /// The columns of torque curves and of a table of losses.
-fn of_table(sheet: &DataSheet) -> Result<(Vec<SpeedColumn>, Vec<String>)> {
-    let (grid, mut notes) = LossGrid::new(&sheet.data.losses)?;
+fn of_table(sheet: &DataSheet) -> Result<(Vec<SpeedColumn>, Remarks)> {
+    let (grid, mut said) = LossGrid::new(&sheet.data.losses)?;
     let torque = sheet.data.torque.as_ref().context("torque is missing")?;
     let axis = torque.speeds()?;
     let (last, end) = (axis[axis.len() - 1], grid.speed[grid.speed.len() - 1]);
@@ -48,7 +50,7 @@ fn of_table(sheet: &DataSheet) -> Result<(Vec<SpeedColumn>, Vec<String>)> {
         end / RPM
     );
     if torque.generator.is_none() {
-        notes.push("the peak torque of a generator is that of a motor: torque.generator is not given".into());
+        said.notes.push("the peak torque of a generator is that of a motor: torque.generator is not given".into());
     }
     let [low, high] = grid.range();
     let column = |n: f64| -> Result<SpeedColumn> {
@@ -59,7 +61,8 @@ fn of_table(sheet: &DataSheet) -> Result<(Vec<SpeedColumn>, Vec<String>)> {
         {
             ensure!(
                 tau <= limit * (1.0 + 1e-9),
-                "losses.torque ends at {limit} N.m, but {side} is {tau} N.m at {:.0} rpm: extend the table",
+                "losses.torque ends at {limit} N.m, but {side} is {} N.m at {:.0} rpm: extend the table",
+                rounded(tau, 6),
                 n / RPM
             );
         }
@@ -83,14 +86,30 @@ fn of_table(sheet: &DataSheet) -> Result<(Vec<SpeedColumn>, Vec<String>)> {
         speeds.sort_by(f64::total_cmp);
     }
     let mut columns = speeds.into_iter().map(column).collect::<Result<Vec<_>>>()?;
-    if torque.drag.is_none() {
-        columns[0].drag = columns[1].drag;
+    match &torque.drag {
+        None => columns[0].drag = columns[1].drag,
+        Some(drag) => said.doubts.extend(doubt(axis.iter().copied().zip(drag.iter().copied()), &grid)),
     }
-    Ok((columns, notes))
+    Ok((columns, said))
+}
+
+/// A drag torque with the gates off, over speed, that takes much more power than the drive loses without torque, or almost none of it.
+fn doubt(mut drag: impl Iterator<Item = (f64, f64)>, grid: &LossGrid) -> Option<String> {
+    let (n, tau, idle) = drag.find_map(|(n, tau)| {
+        let (power, idle) = (n * tau, grid.at(n, 0.0));
+        (power > 1.5 * idle || (power > 0.0 && power < 0.01 * idle)).then_some((n, tau, idle))
+    })?;
+    Some(format!(
+        "torque.drag = {} N.m at {:.0} rpm takes {} W with the gates off, but the drive loses {} W without torque",
+        rounded(tau, 6),
+        n / RPM,
+        rounded(n * tau, 4),
+        rounded(idle, 4)
+    ))
 }
 
 /// The columns of `map.csv` of `fmu map`, at one voltage and one temperature.
-fn of_map(sheet: &DataSheet, map: &Columns) -> Result<(Vec<SpeedColumn>, Vec<String>)> {
+fn of_map(sheet: &DataSheet, map: &Columns) -> Result<(Vec<SpeedColumn>, Remarks)> {
     let [speed, torque, u_dc, T, p_in, p_mech, p_iron, p_friction] = {
         let mut places = [0; 8];
         for (place, name) in places.iter_mut().zip(MAP) {
@@ -163,15 +182,11 @@ fn of_map(sheet: &DataSheet, map: &Columns) -> Result<(Vec<SpeedColumn>, Vec<Str
         return Err(Error::new(format!("{file}: needs speeds from 0 on with torques of both signs")));
     }
     columns[0].drag = columns[1].drag;
-    Ok((columns, Vec::new()))
+    Ok((columns, Remarks::default()))
 }
 
 /// The columns of a map, within torque curves.
-fn with_torque(
-    torque: &Torque,
-    map: &[SpeedColumn],
-    mut notes: Vec<String>,
-) -> Result<(Vec<SpeedColumn>, Vec<String>)> {
+fn with_torque(torque: &Torque, map: &[SpeedColumn], mut said: Remarks) -> Result<(Vec<SpeedColumn>, Remarks)> {
     let (axis, last) = (torque.speeds()?, map[map.len() - 1].speed);
     ensure!(
         axis[axis.len() - 1] <= last * (1.0 + 1e-9),
@@ -187,16 +202,16 @@ fn with_torque(
         ensure!(
             wanted[0] <= column.peak[0] * (1.0 + 1e-3),
             "torque.peak is {} N.m at {:.0} rpm, but the map ends at {} N.m",
-            wanted[0],
+            rounded(wanted[0], 6),
             column.speed / RPM,
-            column.peak[0]
+            rounded(column.peak[0], 6)
         );
         ensure!(
             wanted[1] <= column.peak[1] * (1.0 + 1e-3) || torque.generator.is_none(),
             "{of} is {} N.m at {:.0} rpm, but the map ends at {} N.m",
-            wanted[1],
+            rounded(wanted[1], 6),
             column.speed / RPM,
-            column.peak[1]
+            rounded(column.peak[1], 6)
         );
         let peak = [wanted[0].min(column.peak[0]), wanted[1].min(column.peak[1])];
         let shares: [f64; SHARES] = std::array::from_fn(share);
@@ -214,7 +229,7 @@ fn with_torque(
         });
     }
     if torque.generator.is_none() {
-        notes.push("the peak torque of a generator is that of a motor, or of the map if that is lower".into());
+        said.notes.push("the peak torque of a generator is that of a motor, or of the map if that is lower".into());
     }
-    Ok((columns, notes))
+    Ok((columns, said))
 }

@@ -42,8 +42,8 @@ pub struct SheetData {
 #[derive(Clone, Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Torque {
-    rpm: Option<Vec<f64>>,
-    speed: Option<Vec<f64>>,
+    pub(super) rpm: Option<Vec<f64>>,
+    pub(super) speed: Option<Vec<f64>>,
     /// Peak torque.
     pub peak: Vec<f64>,
     /// Continuous torque.
@@ -60,8 +60,8 @@ pub struct Torque {
 #[derive(Clone, Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct LossTable {
-    rpm: Option<Vec<f64>>,
-    speed: Option<Vec<f64>>,
+    pub(super) rpm: Option<Vec<f64>>,
+    pub(super) speed: Option<Vec<f64>>,
     /// Torques in N.m.
     pub torque: Option<Vec<f64>>,
     /// Efficiency, a row per speed.

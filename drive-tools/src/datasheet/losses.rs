@@ -4,8 +4,10 @@
 //! torque, where the efficiency is 0/0, are given or extrapolated with a + b tau^2 from the two smallest torques, and so are cells
 //! without a value beyond the envelope. At standstill, the losses are those of the lowest speed minus those without torque.
 
+use super::Remarks;
 use super::file::{LossTable, RPM, curve, increasing};
 use crate::error::{Result, WithContext, bail, ensure};
+use fmu_core::digits::rounded;
 
 /// Losses in W on a grid.
 #[derive(Clone, Debug)]
@@ -38,11 +40,11 @@ fn parabola([x_1, y_1]: [f64; 2], [x_2, y_2]: [f64; 2]) -> [f64; 2] {
 }
 
 impl LossGrid {
-    /// The grid of a table, and notes.
+    /// The grid of a table, and remarks.
     ///
     /// # Errors
     /// A value that is wrong, or missing.
-    pub fn new(table: &LossTable) -> Result<(Self, Vec<String>)> {
+    pub fn new(table: &LossTable) -> Result<(Self, Remarks)> {
         let speed = table.speeds()?;
         let torque = table.torque.as_ref().context("losses.torque is missing: the torques of the table in N.m")?;
         increasing("losses.torque", torque)?;
@@ -56,15 +58,15 @@ impl LossGrid {
             _ => bail!("losses: give efficiency or loss, one of them"),
         };
         ensure!(rows.len() == speed.len(), "{key} has {} rows, but the table has {} speeds", rows.len(), speed.len());
-        let mut notes = Vec::new();
+        let mut said = Remarks::default();
         let mirrored = torque[0] >= 0.0;
         if mirrored {
-            notes.push(
+            said.notes.push(
                 "a generator loses as much as a motor at the same torque: losses.torque has no negative values".into(),
             );
         }
         let mut grid = Self { speed: Vec::new(), torque: Vec::new(), loss: Vec::new() };
-        let mut extrapolated = false;
+        let (mut extrapolated, mut doubts) = (false, Vec::new());
         for (k, (row, n)) in rows.iter().zip(&speed).enumerate() {
             ensure!(
                 row.len() == torque.len(),
@@ -97,6 +99,7 @@ impl LossGrid {
             let (row, is_extrapolated) = completed(&points, torque, no_load)
                 .with_context(|| format!("{key}[{}], at {:.0} rpm", k + 1, n / RPM))?;
             extrapolated |= is_extrapolated;
+            doubts.extend(doubt(&points, no_load, n / RPM));
             let (torque, row) =
                 if mirrored { mirror(&row) } else { row.iter().map(|[tau, loss]| (*tau, *loss)).unzip() };
             grid.torque = torque;
@@ -104,12 +107,13 @@ impl LossGrid {
             grid.loss.push(row);
         }
         if extrapolated {
-            notes.push(
+            said.notes.push(
                 "the losses at zero torque are extrapolated from the two smallest torques: give losses.no_load".into(),
             );
         }
+        said.doubts.extend(first_of(doubts));
         grid.stand();
-        Ok((grid, notes))
+        Ok((grid, said))
     }
 
     /// Adds the row of standstill.
@@ -164,6 +168,41 @@ fn completed(points: &[[f64; 2]], torque: &[f64], no_load: Option<f64>) -> Resul
     let mut all: Vec<[f64; 2]> = generator.into_iter().chain([[0.0, idle]]).chain(motor).collect();
     all.sort_by(|a, b| a[0].total_cmp(&b[0]));
     Ok((all, given.is_none()))
+}
+
+/// What is odd in the losses of a row, of torques and losses without those that were extrapolated: losses that fall while the torque
+/// rises, or a loss at zero torque that the others do not lead to.
+fn doubt(points: &[[f64; 2]], no_load: Option<f64>, rpm: f64) -> Option<String> {
+    let motor: Vec<[f64; 2]> = points.iter().copied().filter(|[tau, _]| *tau > 0.0).collect();
+    let generator: Vec<[f64; 2]> = points.iter().rev().copied().filter(|[tau, _]| *tau < 0.0).collect();
+    let at = |[tau, loss]: [f64; 2]| format!("{} W at {tau} N.m", rounded(loss, 4));
+    let falls =
+        |side: &[[f64; 2]]| side.windows(2).find(|pair| pair[1][1] < 0.8 * pair[0][1]).map(|pair| [pair[0], pair[1]]);
+    if let Some([one, two]) = falls(&motor).or_else(|| falls(&generator)) {
+        return Some(format!("at {rpm:.0} rpm, the losses fall from {} to {}: check both values", at(one), at(two)));
+    }
+    let (no_load, [one, two, ..]) = (no_load?, &motor[..]) else { return None };
+    let [idle, _] = parabola(*one, *two);
+    (no_load > 1.2 * one[1] || no_load < 0.5 * idle).then(|| {
+        format!(
+            "losses.no_load is {} W at {rpm:.0} rpm, but {} and {} lead to {} W without torque",
+            rounded(no_load, 4),
+            at(*one),
+            at(*two),
+            rounded(idle, 4)
+        )
+    })
+}
+
+/// The first of several doubts, with the number of the others.
+fn first_of(doubts: Vec<String>) -> Option<String> {
+    let others = doubts.len().saturating_sub(1);
+    let first = doubts.into_iter().next()?;
+    Some(match others {
+        0 => first,
+        1 => format!("{first}; another speed is odd, too"),
+        _ => format!("{first}; {others} other speeds are odd, too"),
+    })
 }
 
 /// Torques and losses of a row with the same losses at negative torques.

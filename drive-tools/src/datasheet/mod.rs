@@ -2,11 +2,13 @@
 //!
 //! [`mod@file`] reads the data sheet, [`losses`] brings its table of losses or efficiencies into one form, [`columns`] the map of
 //! `fmu map`, and [`reduce`] chooses the speeds of the tables.
+//! [`mod@plausible`] refuses values in another unit.
 
 pub mod column;
 pub mod columns;
 pub mod file;
 pub mod losses;
+mod plausible;
 pub mod reduce;
 
 use crate::error::Result;
@@ -15,6 +17,13 @@ use drive::mapped_drive::map::{Map, SHARES, SPEEDS, share};
 use file::DataSheet;
 use serde_json::json;
 use std::path::Path;
+
+/// What is to be said of a data sheet: assumptions, and values that may be wrong.
+#[derive(Debug, Default)]
+pub struct Remarks {
+    notes: Vec<String>,
+    doubts: Vec<String>,
+}
 
 /// The drive of a data sheet.
 #[derive(Clone, Debug)]
@@ -31,6 +40,8 @@ pub struct MappedSheet {
     pub bandwidth: f64,
     /// Assumptions about what the data sheet does not say.
     pub notes: Vec<String>,
+    /// Values that may be wrong.
+    pub doubts: Vec<String>,
 }
 
 /// The drive of the data sheet at `path`.
@@ -39,7 +50,15 @@ pub struct MappedSheet {
 /// The file cannot be read, or a value is wrong; the message names the file, the value and what is allowed.
 pub fn read(path: &Path) -> Result<MappedSheet> {
     let sheet = DataSheet::read(path)?;
-    let (columns, notes) = columns::of(&sheet)?;
+    let of_map = sheet.data.torque.is_none();
+    if !of_map {
+        plausible::check(&sheet, None)?;
+    }
+    let (columns, Remarks { notes, doubts }) = columns::of(&sheet)?;
+    if of_map {
+        let top = columns.iter().map(|column| column.speed).fold(0.0, f64::max);
+        plausible::check(&sheet, Some([top, columns.iter().map(|column| column.peak[0]).fold(0.0, f64::max)]))?;
+    }
     let t_overload = sheet.t_overload(&columns)?;
     let chosen = reduce::reduce(&columns);
     let mut map = Map { u_dc: sheet.data.dc_link.u_dc, t_overload, ..Map::default() };
@@ -57,6 +76,7 @@ pub fn read(path: &Path) -> Result<MappedSheet> {
         J: sheet.data.mechanics.J,
         bandwidth: sheet.data.bandwidth.torque,
         notes,
+        doubts,
     })
 }
 
@@ -104,13 +124,14 @@ impl MappedSheet {
     }
 }
 
-/// The values of `MappedDrive` for the data sheet at `path`, as JSON.
+/// The values of `MappedDrive` for the data sheet at `path`, as JSON, and its doubts.
 ///
 /// # Errors
 /// Those of [`read`].
-pub fn values(path: &Path) -> Result<serde_json::Value> {
+pub fn values(path: &Path) -> Result<(serde_json::Value, Vec<String>)> {
     let mut all = serde_json::Map::new();
-    for (name, value) in read(path)?.values() {
+    let sheet = read(path)?;
+    for (name, value) in sheet.values() {
         let value = match value {
             Value::Real(x) => json!(x),
             Value::Reals(all) => json!(all),
@@ -120,5 +141,5 @@ pub fn values(path: &Path) -> Result<serde_json::Value> {
         };
         all.insert(name.into(), value);
     }
-    Ok(all.into())
+    Ok((all.into(), sheet.doubts))
 }

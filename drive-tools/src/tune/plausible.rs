@@ -1,128 +1,30 @@
-//! Refuses implausible values, which are mostly values in another unit: 36 H for 36 mH, rpm for rad/s, g.cm2 for
-//! kg.m2.
+//! The plausible values of a motor file.
 //!
-//! Each check forms a ratio of the value to others in the file, and states the range of this ratio for real machines: L i / psi_M
-//! at the maximum current; R_s i against u_dc; the EMF at rated speed against u_dc / sqrt(3); the time in which the rated
-//! torque reaches the rated speed; the rated torque against that of the maximum current; friction against the rated torque. The value
-//! to correct may be another one of the ratio: the error names the one that, converted from another unit, brings all ratios into
-//! their ranges.
+//! The ratios: L i / psi_M at the maximum current; R_s i against u_dc; the EMF at rated speed against u_dc / sqrt(3); the time in
+//! which the rated torque reaches the rated speed; the rated torque against that of the maximum current; friction against the
+//! rated torque; drops and switching losses against the link.
 
 use super::motor::{Data, Located, MotorFile};
-use crate::error::{Result, bail};
+use crate::error::Result;
+use crate::plausible::{
+    self, CORRECT, CURRENT, Check, ENERGY, FLUX_LINKAGE, FREQUENCY, FRICTION, INDUCTANCE, INERTIA, PER_KELVIN, POWER,
+    RESISTANCE, SPEED, TIME, TORQUE, VOLTAGE,
+};
 use drive::implausible::{MAGNET, PERIOD, WINDING};
 use drive::plant::inverter::LOST;
 use fmu_core::digits::rounded;
-use std::f64::consts::PI;
-
-/// Other units in which a value may have been written, with their size in the expected unit.
-type Units = &'static [(&'static str, f64)];
-
-/// A value, its position, and the ratio that shows whether it is plausible.
-struct Check {
-    name: &'static str,
-    unit: &'static str,
-    units: Units,
-    /// The value in the data, unless it is one of a list.
-    of: fn(&mut Data) -> Option<&mut Located>,
-    value: f64,
-    /// Position in the file.
-    at: usize,
-    /// The ratio per unit of the value; it is proportional to the value.
-    per_unit: f64,
-    what: &'static str,
-    range: (f64, f64),
-    /// The usual range; a value converted from another unit must lie within it.
-    usual: (f64, f64),
-    /// Advice if no other unit fits.
-    remedy: String,
-}
-
-impl Check {
-    fn ratio(&self) -> f64 {
-        self.value * self.per_unit
-    }
-
-    fn passes(&self) -> bool {
-        // Without the values it is compared with, there is no ratio; a negative value is refused by the parameter's own range.
-        let (ratio, (low, high)) = (self.ratio(), self.range);
-        ratio.is_nan() || (low == 0.0 && ratio < 0.0) || (low..=high).contains(&ratio)
-    }
-
-    /// Whether the value, in a unit of this `size`, is a usual one.
-    fn fits(&self, size: f64) -> bool {
-        (self.usual.0..=self.usual.1).contains(&(self.ratio() * size))
-    }
-
-    /// Whether all values are plausible once this one is converted from a unit of this `size`.
-    fn cures(&self, size: f64, data: &Data) -> bool {
-        let mut data = data.clone();
-        let Some(value) = (self.of)(&mut data) else { return false };
-        *value.get_mut() *= size;
-        self.fits(size) && checks(&mut data).iter().all(Self::passes)
-    }
-
-    /// The first other unit with this property, and the converted value.
-    fn written_in(&self, fits: impl Fn(f64) -> bool) -> Option<String> {
-        let &Self { value, unit, .. } = self;
-        let (other, size) = self.units.iter().find(|(_, size)| fits(*size))?;
-        Some(format!("{value} {other} would fit: write {} {unit}", rounded(value * size, 4)))
-    }
-
-    fn usual(self, low: f64, high: f64) -> Self {
-        Self { usual: (low, high), ..self }
-    }
-
-    fn remedy(self, remedy: impl Into<String>) -> Self {
-        Self { remedy: remedy.into(), ..self }
-    }
-}
 
 /// Checks all values.
 ///
 /// # Errors
-/// The first value that is out of its range: the value, the expected range, and a unit that would fit.
+/// The first value that is out of its range: its place, the value, the expected range, and a unit that would fit.
 pub fn check(motor: &MotorFile) -> Result<()> {
-    let data = &motor.data;
-    let all = checks(&mut data.clone());
-    let Some(failed) = all.iter().find(|check| !check.passes()) else { return Ok(()) };
-    let &Check { name, value, unit, what, range: (low, high), ref remedy, .. } = failed;
-    let cure = |check: &Check| check.written_in(|size| check.cures(size, data));
-    // Another value, if it is the only one.
-    let other = || {
-        let mut found = all.iter().filter_map(|check| Some((check, cure(check)?)));
-        let (check, suggestion) = found.next()?;
-        let place = motor.place_at(check.at);
-        found.all(|(other, _)| other.name == check.name).then(|| format!("{}: {place}: {suggestion}", check.name))
-    };
-    let suggestion = cure(failed).or_else(other).or_else(|| failed.written_in(|size| failed.fits(size)));
-    bail!(
-        "{}: {name} = {} makes {what} {}, expected {low} to {high}: {}",
-        motor.place_at(failed.at),
-        format!("{value} {unit}").trim_end(),
-        rounded(failed.ratio(), 4),
-        suggestion.as_ref().unwrap_or(remedy)
-    )
+    plausible::check(&motor.data, &|data| checks(&mut data.clone()), &|at| motor.place_at(at))
 }
 
-const SPEED: Units = &[("rpm", PI / 30.0), ("deg/s", PI / 180.0)];
-const VOLTAGE: Units = &[("kV", 1e3), ("mV", 1e-3)];
-const CURRENT: Units = &[("mA", 1e-3), ("kA", 1e3)];
-const RESISTANCE: Units = &[("mOhm", 1e-3), ("uOhm", 1e-6)];
-const INDUCTANCE: Units = &[("mH", 1e-3), ("uH", 1e-6)];
-const FLUX_LINKAGE: Units = &[("mWb", 1e-3), ("uWb", 1e-6)];
-const TORQUE: Units = &[("mN.m", 1e-3), ("N.cm", 1e-2), ("kN.m", 1e3)];
-const INERTIA: Units = &[("kg.cm2", 1e-4), ("g.cm2", 1e-7), ("g.m2", 1e-3)];
-const ENERGY: Units = &[("mJ", 1e-3), ("uJ", 1e-6)];
-const FRICTION: Units = &[("mN.m.s/rad", 1e-3), ("N.m.s/deg", 180.0 / PI), ("N.m/rpm", 30.0 / PI)];
-const POWER: Units = &[("kW", 1e3), ("mW", 1e-3)];
-const FREQUENCY: Units = &[("kHz", 1e3), ("MHz", 1e6)];
-const TIME: Units = &[("ms", 1e-3), ("us", 1e-6)];
-const PER_KELVIN: Units = &[("%/K", 1e-2), ("ppm/K", 1e-6)];
-
-const CORRECT: &str = "correct it, or the values it is compared with";
 const WEAKENS: &str = "a magnet weakens as it warms: NdFeB has -1.1e-3, SmCo -0.4e-3, ferrite -2e-3";
 
-/// Switching frequency in Hz where the file has none, for the judgment of an energy.
+/// Switching frequency in Hz where the file has none, to check an energy.
 const USUAL_FREQUENCY: f64 = 1e4;
 
 /// Advice on psi_M.
@@ -152,20 +54,23 @@ fn of_current(data: &Data) -> String {
     )
 }
 
-/// The pairs of the drag test with the highest speed, and with the greatest torque.
-fn drag_test(data: &Data) -> Vec<Check> {
+/// The pairs of the drag test with the highest speed, and with the greatest torque; the rise of the torque with speed.
+fn drag_test(data: &Data) -> Vec<Check<Data>> {
     let Some(iron) = &data.iron else { return Vec::new() };
     let most = |of: fn(&[f64; 2]) -> f64| iron.p.get_ref().iter().copied().max_by(|a, b| of(a).total_cmp(&of(b)));
-    let (Some([fastest, _]), Some([speed, p])) = (most(|[speed, _]| *speed), most(|[speed, p]| p / speed)) else {
+    let (Some([fastest, p_of_fastest]), Some([speed, p])) = (most(|[speed, _]| *speed), most(|[speed, p]| p / speed))
+    else {
         return Vec::new();
     };
-    let check = |name, unit, units, value, per_unit, what, range, usual| Check {
+    let check = |place: usize, name, unit, units, value, per_unit, what, range, usual| Check {
         name,
         unit,
         units,
-        of: |_| None,
+        convert: Box::new(move |data: &mut Data, size| {
+            data.iron.iter_mut().flat_map(|iron| iron.p.get_mut()).for_each(|pair| pair[place] *= size);
+        }),
         value,
-        at: iron.p.span().start,
+        at: Some(iron.p.span().start),
         per_unit,
         what,
         range,
@@ -173,14 +78,28 @@ fn drag_test(data: &Data) -> Vec<Check> {
         remedy: CORRECT.into(),
     };
     let (multiple, of_top) = ("its multiple of the highest speed of [rating]", 1.0 / data.rating.top());
+    let slowest = iron.p.get_ref().iter().copied().min_by(|a, b| a[0].total_cmp(&b[0]));
+    let rise = slowest.map_or(f64::NAN, |[speed, p]| speed / p);
     let (share, of_torque) = ("its torque over rating.torque", 1.0 / (speed * data.rating.torque.get_ref()));
     vec![
-        check("a speed of iron.p", "rad/s", SPEED, fastest, of_top, multiple, (0.05, 4.0), (0.1, 2.0)),
-        check("a power of iron.p", "W", POWER, p, of_torque, share, (1e-4, 0.3), (1e-3, 0.2)),
+        check(0, "a speed of iron.p", "rad/s", SPEED, fastest, of_top, multiple, (0.05, 4.0), (0.1, 2.0)),
+        check(1, "a power of iron.p", "W", POWER, p, of_torque, share, (1e-4, 0.3), (1e-3, 0.2)),
+        check(
+            1,
+            "the power of iron.p at the highest speed",
+            "W",
+            &[],
+            p_of_fastest,
+            rise / fastest,
+            "the drag torque over that at the lowest speed",
+            (0.8, 1e3),
+            (1.0, 1e2),
+        )
+        .remedy("friction and iron losses do not fall with speed: each pair of iron.p is [speed, power]"),
     ]
 }
 
-fn checks(data: &mut Data) -> Vec<Check> {
+fn checks(data: &mut Data) -> Vec<Check<Data>> {
     let (machine, rating) = (&data.machine, &data.rating);
     let of = |x: &Located| *x.get_ref();
     let (n_p, psi_M, i, u_dc) =
@@ -195,8 +114,25 @@ fn checks(data: &mut Data) -> Vec<Check> {
     let frequency = inverter.and_then(|x| x.f_sw.as_ref()).map_or(USUAL_FREQUENCY, of);
     let friction = "its torque at rating.speed, over rating.torque,";
     let mut check = |name, unit, units, of: fn(&mut Data) -> Option<&mut Located>, per_unit, what, range| {
-        let (value, at) = of(data).map(|x| (*x.get_ref(), x.span().start))?;
-        Some(Check { name, unit, units, of, value, at, per_unit, what, range, usual: range, remedy: CORRECT.into() })
+        let (value, at) = of(data).map(|x| (*x.get_ref(), Some(x.span().start)))?;
+        let convert = Box::new(move |data: &mut Data, size| {
+            if let Some(value) = of(data) {
+                *value.get_mut() *= size;
+            }
+        });
+        Some(Check {
+            name,
+            unit,
+            units,
+            convert,
+            value,
+            at,
+            per_unit,
+            what,
+            range,
+            usual: range,
+            remedy: CORRECT.into(),
+        })
     };
     #[rustfmt::skip]
     let found = [
@@ -358,6 +294,10 @@ mod tests {
               800 mV would fit: write 0.8 V",
             ),
             ("[inverter]\nr_diode = 60.0", "60 mOhm would fit: write 0.06 Ohm"),
+            (
+                "[iron]\np = [[11.8, 22.4], [53.4, 57.1]]",
+                "drag torque over that at the lowest speed 0.5633, expected 0.8 to 1000: friction and iron losses do not fall",
+            ),
             ("[inverter]\nE_sw = 2.5\ni_sw = 15.0\nu_sw = 600.0", "2.5 mJ would fit: write 0.0025 J"),
             ("[inverter]\nE_sw = 2.5e-3\ni_sw = 15000.0\nu_sw = 600.0", "15000 mA would fit: write 15 A"),
             ("[inverter]\nE_sw = 2.5e-3\ni_sw = 15.0\nu_sw = 0.6", "0.6 kV would fit: write 600 V"),

@@ -10,6 +10,7 @@ motor files by their names. `tune` returns start values for `fmurun` and FMPy:
 
 import json
 import os
+import warnings
 from pathlib import Path
 
 from .. import _core
@@ -89,9 +90,15 @@ def from_datasheet(sheet, *, fmi=3):
     Raises:
         FmuError: the file cannot be read or is invalid; the message names file and value
         ValueError: `fmi` is neither 2 nor 3
+
+    Warns:
+        UserWarning: a value may be wrong, for example losses that fall while the torque rises
     """
     _standard(fmi)
-    return _flat(json.loads(_core.datasheet(os.fspath(sheet))), fmi)
+    values, doubts = _core.datasheet(os.fspath(sheet))
+    for doubt in doubts:
+        warnings.warn(doubt, stacklevel=2)
+    return _flat(json.loads(values), fmi)
 
 
 def _standard(fmi):
