@@ -53,6 +53,8 @@ pub struct TorqueWindow {
     pub x: [f64; SIZE],
     /// Integral of the electromagnetic torque without the load, N.m.s.
     pub y: f64,
+    /// Integral of the load, N.m.s.
+    pub load: f64,
 }
 
 impl Shown {
@@ -71,21 +73,21 @@ impl Shown {
         for run in &motion.runs {
             let mut start = run.start;
             while start + width < run.end {
-                let (mut x, mut y, mut made) = ([0.0; SIZE], 0.0, 0.0);
+                let (mut x, mut load, mut made) = ([0.0; SIZE], 0.0, 0.0);
                 for k in start..=start + width {
                     let part = if k == start || k == start + width { 0.5 * record.step } else { record.step };
                     let w_m = motion.w[k] / n_p;
-                    let tau = torque(k);
                     x[1] += part * w_m;
                     x[2] += part * sign(w_m);
-                    made += part * tau;
-                    y += part * (tau - record.load.as_ref().map_or(0.0, |load| load[k]));
+                    made += part * torque(k);
+                    load += part * record.load.as_ref().map_or(0.0, |load| load[k]);
                 }
                 x[0] = (motion.w[start + width] - motion.w[start]) / n_p;
                 let time = width as f64 * record.step;
                 greatest = greatest.max((made / time).abs());
                 bins[((x[1] / time / speed).abs() * 100.0).clamp(0.0, 100.0) as usize] += 1;
-                rows.push(TorqueWindow { t: 0.5 * (record.t[start] + record.t[start + width]), time, x, y });
+                let t = 0.5 * (record.t[start] + record.t[start + width]);
+                rows.push(TorqueWindow { t, time, x, y: made - load, load });
                 start += width;
             }
         }
@@ -93,42 +95,60 @@ impl Shown {
         Self { speed, torque: greatest, levels, rows }
     }
 
-    /// The fit: least squares assuming an error of 1 % of the torque in each row, with less weight beyond 2.5 standard
-    /// deviations.
+    /// The fit.
     pub fn fit(&self) -> Option<MechanicalFit> {
-        let typical = quantile(self.rows.iter().map(|row| row.y.abs()).collect(), 0.9);
-        let size = |y: f64| 0.01 * y.abs() + 0.005 * typical;
-        let mut weights: Vec<f64> = self.rows.iter().map(|row| 1.0 / size(row.y)).collect();
-        let base = weights.clone();
-        let mut p = DVector::zeros(SIZE);
-        for _ in 0..3 {
-            let mut sums = Sums::new(SIZE);
-            for (TorqueWindow { x, y, .. }, weight) in self.rows.iter().zip(&weights) {
-                sums.add(&x.map(|x| x * weight), y * weight);
-            }
-            p = interval::solve(&sums.matrix, &sums.score)?;
-            let rests: Vec<f64> = self.rows.iter().zip(&base).map(|(row, b)| b * (row.y - dot(&row.x, &p))).collect();
-            let sigma = 1.4826 * quantile(rests.iter().map(|r| r.abs()).collect(), 0.5);
-            for ((weight, base), rest) in weights.iter_mut().zip(&base).zip(&rests) {
-                // Huber: the square root of the weight of a square.
-                let keep = if rest.abs() > 2.5 * sigma { 2.5 * sigma / rest.abs() } else { 1.0 };
-                *weight = base * keep.sqrt();
-            }
-        }
-        let rows: Vec<_> = self.rows.iter().zip(&weights).collect();
-        let block = |chunk: &[(&TorqueWindow, &f64)]| {
-            let mut block = Sums::new(SIZE);
-            for (TorqueWindow { x, y, .. }, weight) in chunk {
-                block.add(&x.map(|x| x * *weight), *weight * (y - dot(x, &p)));
-            }
-            block
-        };
-        let blocks: Vec<Sums> = rows.chunks(BLOCK).map(block).collect();
-        let units = DMatrix::<f64>::identity(SIZE, SIZE);
-        let gradients: Vec<DVector<f64>> = units.column_iter().map(nalgebra::Matrix::into_owned).collect();
-        let half = interval::half_widths(&blocks, &gradients)?;
-        Some(MechanicalFit { p: [p[0], p[1], p[2]], half: [half[0], half[1], half[2]] })
+        let rows: Vec<_> = self.rows.iter().map(|row| (row.x, row.y)).collect();
+        least_squares(&rows).map(|(p, half)| MechanicalFit { p, half })
     }
+
+    /// Torque of the currents for each N.m of the load, and its half-width (95 %): 1 if voltages, currents and load have one scale.
+    pub fn per_load(&self) -> Option<(f64, f64)> {
+        let with_load =
+            |TorqueWindow { x: [dw, w, sign], y, load, .. }: &TorqueWindow| ([*dw, *w, *sign, *load], y + load);
+        if self.rows.iter().all(|row| row.load == 0.0) {
+            return None;
+        }
+        let rows: Vec<_> = self.rows.iter().map(with_load).collect();
+        least_squares(&rows).map(|(p, half)| (p[SIZE], half[SIZE]))
+    }
+}
+
+/// Least squares assuming an error of 1 % of the torque in each row of regressors and torque, with less weight beyond 2.5 standard
+/// deviations: parameters and half-widths (95 %).
+fn least_squares<const N: usize>(rows: &[([f64; N], f64)]) -> Option<([f64; N], [f64; N])> {
+    let typical = quantile(rows.iter().map(|(_, y)| y.abs()).collect(), 0.9);
+    let size = |y: f64| 0.01 * y.abs() + 0.005 * typical;
+    let mut weights: Vec<f64> = rows.iter().map(|(_, y)| 1.0 / size(*y)).collect();
+    let base = weights.clone();
+    let dot = |x: &[f64; N], p: &DVector<f64>| x.iter().zip(p.iter()).map(|(x, p)| x * p).sum::<f64>();
+    let mut p = DVector::zeros(N);
+    for _ in 0..3 {
+        let mut sums = Sums::new(N);
+        for ((x, y), weight) in rows.iter().zip(&weights) {
+            sums.add(&x.map(|x| x * weight), y * weight);
+        }
+        p = interval::solve(&sums.matrix, &sums.score)?;
+        let rests: Vec<f64> = rows.iter().zip(&base).map(|((x, y), b)| b * (y - dot(x, &p))).collect();
+        let sigma = 1.4826 * quantile(rests.iter().map(|r| r.abs()).collect(), 0.5);
+        for ((weight, base), rest) in weights.iter_mut().zip(&base).zip(&rests) {
+            // Huber: the square root of the weight of a square.
+            let keep = if rest.abs() > 2.5 * sigma { 2.5 * sigma / rest.abs() } else { 1.0 };
+            *weight = base * keep.sqrt();
+        }
+    }
+    let rows: Vec<_> = rows.iter().zip(&weights).collect();
+    let block = |chunk: &[(&([f64; N], f64), &f64)]| {
+        let mut block = Sums::new(N);
+        for ((x, y), weight) in chunk {
+            block.add(&x.map(|x| x * *weight), *weight * (y - dot(x, &p)));
+        }
+        block
+    };
+    let blocks: Vec<Sums> = rows.chunks(BLOCK).map(block).collect();
+    let units = DMatrix::<f64>::identity(N, N);
+    let gradients: Vec<DVector<f64>> = units.column_iter().map(nalgebra::Matrix::into_owned).collect();
+    let half = interval::half_widths(&blocks, &gradients)?;
+    Some((std::array::from_fn(|k| p[k]), std::array::from_fn(|k| half[k])))
 }
 
 /// Levels in a histogram of the speed with 100 bins: the fullest tenth of the range, then the next one outside its
@@ -144,8 +164,4 @@ fn levels(mut bins: [usize; 101], windows: usize) -> usize {
         levels += 1;
         bins[fullest.saturating_sub(5)..(fullest + 15).min(101)].fill(0);
     }
-}
-
-fn dot(x: &[f64; SIZE], p: &DVector<f64>) -> f64 {
-    x.iter().zip(p.iter()).map(|(x, p)| x * p).sum()
 }

@@ -146,6 +146,7 @@ pub fn identify(signals: &Signals, options: &Options) -> Result<Identified> {
     let mut notes = record.notes.clone();
     let misfit = (facts.misfit() || !fit.is_possible()).then(|| verdict::better(&record, &motion, timing, i_max, &fit));
     notes.push(SCALE.into());
+    let doubt = doubt.or_else(|| verdict::scales(&shown));
     let values = verdict::values(&fit, mechanics.as_ref(), &facts, misfit, doubt);
     let rating = |given: Option<f64>, seen: f64| (given.unwrap_or(seen), given.is_some());
     let ratings = Ratings {

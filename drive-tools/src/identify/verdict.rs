@@ -5,6 +5,7 @@ use super::mechanics::{MechanicalFit, Shown};
 use super::motion::Motion;
 use super::record::{BenchRecord, Complex, quantile};
 use super::windows::{Problem, Timing};
+use fmu_core::digits::rounded;
 use serde::Serialize;
 
 /// Maximum R T/L for a step, and for a step that equals a sample of the controller: within a sample the voltage is constant and
@@ -138,6 +139,33 @@ pub(super) fn better(record: &BenchRecord, motion: &Motion, timing: Timing, i_ma
         None => "the model does not fit, not even with other phases, signs and delays: check columns, units and timing"
             .into(),
     }
+}
+
+/// Ratios of the torque of the currents to the load that have one common cause.
+const SCALES: [(f64, &str); 9] = [
+    (-1.0, "the load has the other sign: it is positive where it brakes positive rotation"),
+    (std::f64::consts::FRAC_1_SQRT_2, "currents or voltages are RMS values: give instantaneous values"),
+    (std::f64::consts::SQRT_2, "currents or voltages are multiplied by sqrt(2)"),
+    (1.732_050_808, "line-to-line voltages are given as phase voltages"),
+    (1.355_8, "the load is in lbf.ft: multiply by 1.3558"),
+    (0.101_972, "the load is in kgf.cm: divide by 10.197"),
+    (1e-3, "the load is in mN.m, or currents or voltages are divided by 1000"),
+    (0.01, "the load is in N.cm"),
+    (1e3, "the load is in kN.m, or currents or voltages are multiplied by 1000"),
+];
+
+/// Relative error of the torque for which sensors, iron losses and saturation may account.
+const TORQUE_ERROR: f64 = 0.1;
+
+/// Why the scales of currents, voltages and load contradict each other.
+pub(super) fn scales(shown: &Shown) -> Option<String> {
+    let (ratio, half) = shown.per_load()?;
+    if (ratio - 1.0).abs() < TORQUE_ERROR + half || half > 0.2 * ratio.abs() {
+        return None;
+    }
+    let cause = SCALES.into_iter().find(|(scale, _)| (ratio / scale - 1.0).abs() < 0.04);
+    let cause = cause.map_or("currents, voltages or load have another scale: check their units", |(_, cause)| cause);
+    Some(format!("currents and voltages give {} times the torque of the load: {cause}", rounded(ratio, 3)))
 }
 
 /// Name, unit, value, half-width, floor of the relative half-width, its limit, and the rules that may forbid the value.

@@ -48,6 +48,36 @@ fn values_scale_with_the_sensors() {
     assert!(one.notes.iter().any(|note| note.starts_with("values scale with the sensors")));
 }
 
+/// The load measures the torque of currents and voltages: no value is given if their scales differ.
+#[test]
+fn scales_that_contradict_each_other_are_named() {
+    let rows = REAL.run();
+    for (i, u, load, message) in [
+        (0.5_f64.sqrt(), 1.0, 1.0, "RMS values"),
+        (1.0, 0.5_f64.sqrt(), 1.0, "RMS values"),
+        (1.0, 3.0_f64.sqrt(), 1.0, "line-to-line voltages"),
+        (1.5, 1.0, 1.0, "have another scale: check their units"),
+        (1.0, 1.0, -1.0, "the load has the other sign"),
+        (1.0, 1.0, 1.0 / 1.3558, "lbf.ft"),
+        (1.0, 1.0, 10.197, "kgf.cm"),
+        (1.0, 1.0, 100.0, "N.cm"),
+        (1.0, 1.0, 1000.0, "mN.m"),
+        (1.0, 1.0, 1e-3, "kN.m"),
+        (1.0, 1e-3, 1.0, "currents or voltages are divided by 1000"),
+    ] {
+        let other = changed(&rows, |r| Row { i: r.i.map(|x| i * x), u: r.u * u, load: r.load * load, ..*r });
+        let found = of(&other, &given()).unwrap();
+        for name in ["R_s", "psi_M", "J"] {
+            let why = refused(&found, name);
+            println!("{why}");
+            assert!(
+                why.starts_with("currents and voltages give ") && why.contains(message),
+                "{message}: {name}: {why}"
+            );
+        }
+    }
+}
+
 #[test]
 fn bad_files_are_named_by_place() {
     let rows = Bench { time: 0.5, ..IDEAL }.run();
