@@ -55,13 +55,34 @@ fn the_cycle_is_that_of_the_examples() {
     assert_eq!(cycle::CYCLE, text("examples/vehicle/cycle.csv"));
     for (vehicle, cycle, message) in [
         ("mass = 1", cycle::CYCLE, "the vehicle"),
-        (cycle::VEHICLE, "0,0\n10,x", "the driving cycle: 10,x"),
+        (cycle::VEHICLE, "0,0\n10,x", "the driving cycle: line 2: 10,x must be time (s) and speed (km/h)"),
+        (cycle::VEHICLE, "0,0\n 5,nan", "line 2: 5,nan must be"),
+        (cycle::VEHICLE, "0,0\n5,-3", "line 2: the speed -3 must be at least 0"),
+        (cycle::VEHICLE, "0,0\n-5,3", "line 2: the time -5 s does not increase"),
         (cycle::VEHICLE, "0,0\n0,1", "the time 0 s does not increase"),
         (cycle::VEHICLE, "0,0", "no two times"),
+        (cycle::VEHICLE, "time,speed [kn]\n0,0\n9,9", "line 1: the unit kn of a speed must be km/h, m/s or mph"),
+        (cycle::VEHICLE, "time,speed\n0,0\n900,900", "line 3: 250 m/s is no speed of a vehicle"),
+        (cycle::VEHICLE, "time,speed\n0,0\n0.1,30", "line 3: from 0 s to 0.1 s, 83.33 m/s2 is no acceleration"),
     ] {
         let error = format!("{:#}", Cycle::new(vehicle, cycle).unwrap_err());
         assert!(error.contains(message), "{error}");
     }
+    for (from, to, message) in [
+        ("mass = 1300.0", "mass = -1.0", "the vehicle: mass = -1 must be greater than 0"),
+        ("mass = 1300.0", "mass = 1.3", "1.3 t would fit: write 1300 kg"),
+        ("wheel_radius = 0.30", "wheel_radius = 300.0", "300 mm would fit: write 0.3 m"),
+        ("wheel_radius = 0.30", "wheel_radius = 30.0", "30 cm would fit: write 0.3 m"),
+        ("rolling_resistance = 0.010", "rolling_resistance = 1.0", "1 % would fit: write 0.01"),
+        ("rotor_inertia = 0.03883", "rotor_inertia = 388.3", "388.3 kg.cm2 would fit: write 0.03883 kg.m2"),
+        ("gear_ratio = 9.0", "gear_ratio = 0.0", "gear_ratio = 0 must be greater than 0"),
+    ] {
+        let error = format!("{:#}", Cycle::new(&cycle::VEHICLE.replacen(from, to, 1), cycle::CYCLE).unwrap_err());
+        assert!(error.contains(message), "{error}");
+    }
+    let [km_h, m_s, none] = ["speed [km/h]\n0,0\n10,36", "speed [m/s]\n0,0\n10,10", "speed\n0,0\n10,36"]
+        .map(|text| Cycle::new(cycle::VEHICLE, &format!("time,{text}")).unwrap().points().collect::<Vec<_>>());
+    assert!(m_s == km_h && none == km_h && m_s.len() == 10);
 }
 
 /// Exact energies within 0.1 %, and the errors of tables of 11 x 11 to 47 x 41 points over 0 to 11 500 rpm.

@@ -1,6 +1,7 @@
 """A vehicle on a driving cycle: the drive is an FMU; the vehicle, its brakes and its driver are here."""
 
 import os
+import re
 import warnings
 from itertools import pairwise
 
@@ -54,6 +55,11 @@ class Vehicle:
             above = name in ("mass", "radius", "gear", "gear_efficiency", "g")
             if not np.isfinite(value) or value < 0.0 or (above and value == 0.0):
                 raise ValueError(f"{name} = {value!r} must be {'greater than' if above else 'at least'} 0")
+        for name, most, advice in (("c_rr", 0.5, "write 1 % as 0.01"), ("radius", 3.0, "write 300 mm as 0.3"), ("rho", 2.0, "that of air is 1.2 kg/m3")):
+            if values[name] > most:
+                raise ValueError(f"{name} = {values[name]!r} must be at most {most}: {advice}")
+        if mass < 10.0 * cda:
+            raise ValueError(f"mass = {mass!r} must be at least 10 kg for each m2 of cda = {cda!r}: write 1.3 t as 1300")
         if gear_efficiency > 1.0:
             raise ValueError(f"gear_efficiency = {gear_efficiency!r} must be at most 1: write 97 % as 0.97")
         self.mass, self.cda, self.c_rr, self.radius, self.gear = mass, cda, c_rr, radius, gear
@@ -79,8 +85,8 @@ class Vehicle:
 
         Args:
             fmu: PmsmDrive, PmsmDriveMean or MappedDrive, or a preset of one
-            cycle: a CSV file with time (s), speed (km/h) and, as a third column, slope (%); or an array of such rows. Straight lines
-                connect them
+            cycle: a CSV file with time (s), speed (km/h, or the unit of a header such as speed [m/s]) and, as a third column, slope (%);
+                or an array of such rows. Straight lines connect them
             start_values: of the FMU, as those of `drives.tune`; they are completed by torque control on an imposed shaft
             slope: of the road (%), constant or rows of (distance in m, slope), if the cycle has none
             driver: gains of the PI controller in 1/s and 1/s2, times the mass
@@ -312,11 +318,14 @@ def _number(values, variables, name):
 def _cycle(cycle):
     """Rows of time (s), speed (km/h) and, if there, slope (%)."""
     if isinstance(cycle, (str, os.PathLike)):
-        path, rows = os.fspath(cycle), []
+        path, rows, size = os.fspath(cycle), [], 1.0
         with open(path, encoding="utf-8") as file:
             for number, line in enumerate(file, 1):
                 line = line.split("#")[0].strip()
-                if not line or (not rows and line[0].isalpha()):
+                if not line:
+                    continue
+                if not rows and line[0].isalpha():
+                    size = _size(line, f"{path}:{number}")
                     continue
                 try:
                     row = [float(cell) for cell in line.split(",")]
@@ -324,7 +333,7 @@ def _cycle(cycle):
                     raise ValueError(f"{path}:{number}: {line} must be time (s), speed (km/h) and perhaps slope (%)") from None
                 if len(row) not in (2, 3) or (rows and len(row) != len(rows[0])):
                     raise ValueError(f"{path}:{number}: has {len(row)} values; expected time, speed and perhaps slope in every line")
-                rows.append(row)
+                rows.append([row[0], row[1] * size, *row[2:]])
     else:
         path, rows = "cycle", cycle
     rows = np.array(rows, dtype=float)
@@ -335,7 +344,22 @@ def _cycle(cycle):
             raise ValueError(f"{path}: the time {b:g} s of row {k + 2} does not increase")
     if not np.isfinite(rows).all() or rows[:, 1].min() < 0.0:
         raise ValueError(f"{path}: speeds must be numbers of at least 0 km/h")
+    fastest = rows[:, 1].max()
+    if fastest > 504.0:
+        raise ValueError(f"{path}: {fastest:g} km/h is no speed of a vehicle: check the units, time in s and speed in km/h")
+    steepest = np.abs(np.diff(rows[:, 1]) / np.diff(rows[:, 0])).max() / 3.6
+    if steepest > 15.0:
+        warnings.warn(f"{path}: {steepest:g} m/s2 is no acceleration of a vehicle: check the units, time in s and speed in km/h", stacklevel=4)
     return rows
+
+
+def _size(header, place):
+    """Size of the unit of the speed in a header, in km/h."""
+    units = {"km/h": 1.0, "m/s": 3.6, "mph": 1.609344}
+    unit = re.search(r"\[(.*?)\]", (header.split(",") + [""])[1])
+    if unit and unit[1] not in units:
+        raise ValueError(f"{place}: the unit {unit[1]} of a speed must be km/h, m/s or mph")
+    return units[unit[1]] if unit else 1.0
 
 
 def _road(slope, rows):

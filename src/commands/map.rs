@@ -46,7 +46,7 @@ pub struct Map {
     /// Number of points compared with PmsmDrive, for each voltage and temperature; 0: none
     #[arg(long, value_name = "N", default_value_t = 5)]
     pub verify: usize,
-    /// Driving cycle: lines of time in s and speed in km/h, interpolated linearly [default: from examples/vehicle]
+    /// Driving cycle: lines of time in s and speed in km/h (or `speed [m/s]` in its header), interpolated linearly [default: from examples/vehicle]
     #[arg(long, value_name = "FILE.csv")]
     pub cycle: Option<PathBuf>,
     /// Vehicle on the cycle [default: from examples/vehicle]

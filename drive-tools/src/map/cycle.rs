@@ -1,7 +1,9 @@
 //! A vehicle on a driving cycle: speed and torque at the shaft of its machine in the middle of each second, and the energy.
 
-use crate::error::{Result, WithContext, bail};
+use crate::error::{Result, WithContext, bail, ensure};
+use crate::plausible::{self, CORRECT, Check, INERTIA, Units};
 use drive::plant::losses::Losses;
+use fmu_core::digits::rounded;
 use serde::Deserialize;
 
 /// A vehicle, in SI units.
@@ -58,25 +60,15 @@ impl Cycle {
         Self::new(VEHICLE, CYCLE)
     }
 
-    /// Reads the texts of a vehicle (TOML) and of a cycle (CSV: time in s, speed in km/h; comments with `#`).
+    /// Reads the texts of a vehicle (TOML) and of a cycle (CSV: time in s, speed in km/h or in the unit of its header; comments
+    /// with `#`).
     ///
     /// # Errors
-    /// A key or a number is missing or wrong.
+    /// A key or a number is missing, wrong, or implausible, mostly in another unit.
     pub fn new(vehicle: &str, cycle: &str) -> Result<Self> {
-        let vehicle = toml::from_str(vehicle).with_context(|| "the vehicle".to_owned())?;
-        let mut corners: Vec<[f64; 2]> = Vec::new();
-        for line in cycle.lines().filter(|line| line.starts_with(|c: char| c.is_ascii_digit())) {
-            let corner = line.split_once(',').and_then(|(t, v)| Some([t.trim().parse().ok()?, v.trim().parse().ok()?]));
-            let [t, v]: [f64; 2] = corner.with_context(|| format!("the driving cycle: {line}"))?;
-            if corners.last().is_some_and(|last| last[0] >= t) {
-                bail!("the driving cycle: the time {t} s does not increase");
-            }
-            corners.push([t, v / 3.6]);
-        }
-        if corners.len() < 2 {
-            bail!("the driving cycle has no two times");
-        }
-        Ok(Self { vehicle, corners })
+        let vehicle: Vehicle = toml::from_str(vehicle).with_context(|| "the vehicle".to_owned())?;
+        vehicle.check().with_context(|| "the vehicle".to_owned())?;
+        Ok(Self { vehicle, corners: corners(cycle).with_context(|| "the driving cycle".to_owned())? })
     }
 
     /// Speed (rad/s) of the machine and torque (N.m) at its shaft in the middle of each second.
@@ -111,4 +103,97 @@ impl Cycle {
         }
         Ok(energy)
     }
+}
+
+impl Vehicle {
+    fn check(&self) -> Result<()> {
+        for (name, x, above) in [
+            ("mass", self.mass, true),
+            ("rolling_resistance", self.rolling_resistance, false),
+            ("drag_area", self.drag_area, false),
+            ("air_density", self.air_density, false),
+            ("wheel_radius", self.wheel_radius, true),
+            ("gear_ratio", self.gear_ratio, true),
+            ("rotor_inertia", self.rotor_inertia, false),
+        ] {
+            let least = if above { "greater than" } else { "at least" };
+            ensure!(x.is_finite() && x >= 0.0 && !(above && x == 0.0), "{name} = {x} must be {least} 0");
+        }
+        plausible::check(self, &checks, &|_| String::new())
+    }
+}
+
+/// Units of lengths and shares.
+const LENGTH: Units = &[("mm", 1e-3), ("cm", 1e-2)];
+const SHARE: Units = &[("%", 1e-2)];
+const MASS: Units = &[("t", 1e3), ("g", 1e-3)];
+
+fn checks(vehicle: &Vehicle) -> Vec<Check<Vehicle>> {
+    type Of = fn(&mut Vehicle) -> &mut f64;
+    let (mut copy, per_wheel) = (vehicle.clone(), vehicle.gear_ratio / vehicle.wheel_radius);
+    let mut check = |name, unit, units, of: Of, per_unit, what, range, usual| {
+        let (value, convert) = (*of(&mut copy), Box::new(move |v: &mut Vehicle, x| *of(v) *= x));
+        // Without air resistance there is no ratio to it.
+        let per_unit = if f64::is_finite(per_unit) { per_unit } else { f64::NAN };
+        Check { name, unit, units, convert, value, at: None, per_unit, what, range, usual, remedy: CORRECT.into() }
+    };
+    #[rustfmt::skip]
+    let all = vec![
+        check("rolling_resistance", "", SHARE, |v| &mut v.rolling_resistance, 1.0, "a share of the weight of", (0.0, 0.5), (1e-3, 0.1)),
+        check("wheel_radius", "m", LENGTH, |v| &mut v.wheel_radius, 1.0, "a radius, in m,", (0.01, 3.0), (0.05, 1.5)),
+        check("mass", "kg", MASS, |v| &mut v.mass, 1.0 / vehicle.drag_area, "its ratio to drag_area, in kg/m2,", (10.0, 1e6), (50.0, 2e4)),
+        check("air_density", "kg/m3", &[], |v| &mut v.air_density, 1.0, "a density, in kg/m3,", (0.0, 2.0), (0.5, 1.5)),
+        check("gear_ratio", "", &[], |v| &mut v.gear_ratio, 1.0, "turns of the machine per turn of the wheel of", (0.05, 500.0), (0.5, 100.0)),
+        check("rotor_inertia", "kg.m2", INERTIA, |v| &mut v.rotor_inertia, per_wheel * per_wheel / vehicle.mass,
+            "its share of the mass, at the wheel,", (0.0, 5.0), (1e-4, 0.5)),
+    ];
+    all
+}
+
+/// Units of a speed in a header, with their size in m/s.
+const SPEEDS: [(&str, f64); 3] = [("km/h", 1.0 / 3.6), ("m/s", 1.0), ("mph", 0.447_04)];
+
+/// Speed in m/s and acceleration in m/s2 beyond which a cycle has another unit.
+const MOST: [f64; 2] = [140.0, 15.0];
+
+/// Time in s and speed in m/s of each line.
+fn corners(text: &str) -> Result<Vec<[f64; 2]>> {
+    let mut corners: Vec<[f64; 2]> = Vec::new();
+    let mut size = SPEEDS[0].1;
+    for (k, line) in text.lines().enumerate() {
+        let (number, line) = (k + 1, line.split('#').next().unwrap_or_default().trim());
+        let cells: Vec<&str> = line.split(',').map(str::trim).collect();
+        if line.is_empty() {
+            continue;
+        }
+        if corners.is_empty() && line.starts_with(|c: char| c.is_alphabetic()) {
+            let unit = cells.get(1).and_then(|name| name.split(['[', ']']).nth(1));
+            size = match unit.map(|unit| SPEEDS.iter().find(|(name, _)| *name == unit).ok_or(unit)) {
+                None => size,
+                Some(Ok((_, size))) => *size,
+                Some(Err(unit)) => bail!("line {number}: the unit {unit} of a speed must be km/h, m/s or mph"),
+            };
+            continue;
+        }
+        let parsed =
+            cells.iter().map(|cell| cell.parse().ok().filter(|x: &f64| x.is_finite())).collect::<Option<Vec<f64>>>();
+        let Some([t, v]) = parsed.as_deref().and_then(|row| <[f64; 2]>::try_from(row).ok()) else {
+            bail!("line {number}: {line} must be time (s) and speed (km/h)");
+        };
+        ensure!(v >= 0.0, "line {number}: the speed {v} must be at least 0");
+        let v = v * size;
+        ensure!(v < MOST[0], "line {number}: {} m/s is no speed of a vehicle: check the units", rounded(v, 4));
+        if let Some([before, of_before]) = corners.last() {
+            ensure!(*before < t, "line {number}: the time {t} s does not increase");
+            let a = (v - of_before) / (t - before);
+            ensure!(
+                a.abs() < MOST[1],
+                "line {number}: from {before} s to {t} s, {} m/s2 is no acceleration of a vehicle: check the units",
+                rounded(a, 4)
+            );
+        }
+        corners.push([t, v]);
+    }
+    ensure!(corners.len() >= 2, "has no two times");
+    Ok(corners)
 }
