@@ -1,9 +1,9 @@
 //! The columns of the tables, at every speed that the data sheet or its map has.
 
-use super::Remarks;
 use super::column::SpeedColumn;
 use super::file::{DataSheet, RPM, Torque};
 use super::losses::{LossGrid, between};
+use super::remarks::Remarks;
 use crate::csv::Columns;
 use crate::error::{Error, Result, WithContext, bail, ensure};
 use crate::map::request::ZERO_CELSIUS;

@@ -4,8 +4,8 @@
 //! torque, where the efficiency is 0/0, are given or extrapolated with a + b tau^2 from the two smallest torques, and so are cells
 //! without a value beyond the envelope. At standstill, the losses are those of the lowest speed minus those without torque.
 
-use super::Remarks;
 use super::file::{LossTable, RPM, curve, increasing};
+use super::remarks::Remarks;
 use crate::error::{Result, WithContext, bail, ensure};
 use fmu_core::digits::rounded;
 
@@ -111,7 +111,7 @@ impl LossGrid {
                 "the losses at zero torque are extrapolated from the two smallest torques: give losses.no_load".into(),
             );
         }
-        said.doubts.extend(first_of(doubts));
+        said.doubt_all(doubts);
         grid.stand();
         Ok((grid, said))
     }
@@ -191,17 +191,6 @@ fn doubt(points: &[[f64; 2]], no_load: Option<f64>, rpm: f64) -> Option<String> 
             at(*two),
             rounded(idle, 4)
         )
-    })
-}
-
-/// The first of several doubts, with the number of the others.
-fn first_of(doubts: Vec<String>) -> Option<String> {
-    let others = doubts.len().saturating_sub(1);
-    let first = doubts.into_iter().next()?;
-    Some(match others {
-        0 => first,
-        1 => format!("{first}; another speed is odd, too"),
-        _ => format!("{first}; {others} other speeds are odd, too"),
     })
 }
 

@@ -2,7 +2,7 @@
 //!
 //! [`mod@file`] reads the data sheet, [`losses`] brings its table of losses or efficiencies into one form, [`columns`] the map of
 //! `fmu map`, and [`reduce`] chooses the speeds of the tables.
-//! [`mod@plausible`] refuses values in another unit.
+//! `plausible` refuses values in another unit.
 
 pub mod column;
 pub mod columns;
@@ -10,20 +10,15 @@ pub mod file;
 pub mod losses;
 mod plausible;
 pub mod reduce;
+pub mod remarks;
 
 use crate::error::Result;
 use crate::tune::setting::Value;
 use drive::mapped_drive::map::{Map, SHARES, SPEEDS, share};
 use file::DataSheet;
+use remarks::Remarks;
 use serde_json::json;
 use std::path::Path;
-
-/// What is to be said of a data sheet: assumptions, and values that may be wrong.
-#[derive(Debug, Default)]
-pub struct Remarks {
-    notes: Vec<String>,
-    doubts: Vec<String>,
-}
 
 /// The drive of a data sheet.
 #[derive(Clone, Debug)]
