@@ -20,8 +20,8 @@
 //!
 //! ```text
 //! theta~ = (1 - g) atan2(-s e_d, s e_q), s = sign e_q where g > 1/2
-//! dw^/dt += g' w_o / 3 (e_q / psi_M - b - w^)                              g' = g, 0 where g < 0.2, i.e. above 2 w_h
-//! db/dt = 0.06 rho (1 - g) (e_q / psi_M - b - w^), |b| <= w_h / 4         -0.06 rho b where g < 0.2
+//! dw^/dt += g' w_o / 3 (e_q / psi_M - b - w^)               g' = g where g > 0.15, 0 where g < 0.05, i.e. above 4.4 w_h
+//! db/dt = 0.06 rho (1 - g) (e_q / psi_M - b - w^), |b| <= max(w_h, |w^|) / 4 -0.06 rho b where g < 0.05
 //! ```
 //!
 //! The angle's gain fades with the EMF, and the speed goes on through zero with e_q, so that theta^ is its integral: the
@@ -121,8 +121,8 @@ pub fn follow<All: AsRef<EmfParameters> + AsRef<TrackerParameters>>(
     tracker.follow(context, (1.0 - g) * angle_error(s, e.d(), e.q()), sample)
 }
 
-/// Share g of standstill below which the EMF does not guide the speed: at twice `w_hold`.
-const FAR: f64 = 0.2;
+/// Share g of standstill below which the EMF does not guide the speed: above 4.4 `w_hold`.
+const FAR: f64 = 0.05;
 
 /// Width in g of the transition above [`FAR`].
 const FADE: f64 = 0.1;
@@ -130,7 +130,7 @@ const FADE: f64 = 0.1;
 /// Rate at which the error of e_q / psi_M is learned, as a share of the tracker's bandwidth.
 const LEARNED: f64 = 0.06;
 
-/// Greatest learned error, as a share of `w_hold`: a greater one would fit a frame that is half a turn off.
+/// Greatest learned error, as a share of the speed and of `w_hold`: a greater one would fit a frame that is half a turn off.
 const MOST: f64 = 0.25;
 
 /// Guides the speed through zero with the EMF `e` (V); returns the share g of standstill.
@@ -149,7 +149,8 @@ pub fn hold<All: AsRef<EmfParameters> + AsRef<TrackerParameters>>(
     tracker.w += T_s * near * context.of::<EmfParameters>().bandwidth / 3.0 * slip;
     let rate = T_s * LEARNED * context.of::<TrackerParameters>().bandwidth;
     let learned = tracker.bias + rate * if near > 0.0 { (1.0 - g) * slip } else { -tracker.bias };
-    tracker.bias = learned.clamp(-MOST * w_hold, MOST * w_hold);
+    let most = MOST * w_hold.max(tracker.w.abs());
+    tracker.bias = learned.clamp(-most, most);
     g
 }
 
@@ -269,7 +270,7 @@ mod tests {
             let (angle, length) = (0.1, motor.psi_M * w);
             let e = DqHat::new(-length * f64::sin(angle), length * f64::cos(angle));
             follow(&mut tracker, &mut direction, &context, e, &Sample::default());
-            let near = if g > FAR { g } else { 0.0 };
+            let near = g * ((g - FAR) / FADE).clamp(0.0, 1.0);
             let slow = 1e-4 * near * par.emf.bandwidth / 3.0 * (e.q() / motor.psi_M - w);
             let expected = if w > 0.0 { (1.0 - g) * angle } else { 0.0 };
             assert!((tracker.w_frame - w - slow - 2.0 * rho * expected).abs() < 1e-9, "{w} rad/s: {tracker:?}");
