@@ -62,8 +62,12 @@ fn the_cycle_is_that_of_the_examples() {
         (cycle::VEHICLE, "0,0\n0,1", "the time 0 s does not increase"),
         (cycle::VEHICLE, "0,0", "no two times"),
         (cycle::VEHICLE, "time,speed [kn]\n0,0\n9,9", "line 1: the unit kn of a speed must be km/h, m/s or mph"),
-        (cycle::VEHICLE, "time,speed\n0,0\n900,900", "line 3: 250 m/s is no speed of a vehicle"),
-        (cycle::VEHICLE, "time,speed\n0,0\n0.1,30", "line 3: from 0 s to 0.1 s, 83.33 m/s2 is no acceleration"),
+        (cycle::VEHICLE, "time,speed\n0,0\n900,900", "line 3: vehicles are slower than 250 m/s"),
+        (
+            cycle::VEHICLE,
+            "time,speed\n0,0\n0.1,30",
+            "line 3: from 0 s to 0.1 s, vehicles accelerate less than 83.33 m/s2",
+        ),
     ] {
         let error = format!("{:#}", Cycle::new(vehicle, cycle).unwrap_err());
         assert!(error.contains(message), "{error}");

@@ -182,13 +182,13 @@ fn corners(text: &str) -> Result<Vec<[f64; 2]>> {
         };
         ensure!(v >= 0.0, "line {number}: the speed {v} must be at least 0");
         let v = v * size;
-        ensure!(v < MOST[0], "line {number}: {} m/s is no speed of a vehicle: check the units", rounded(v, 4));
+        ensure!(v < MOST[0], "line {number}: vehicles are slower than {} m/s: check the units", rounded(v, 4));
         if let Some([before, of_before]) = corners.last() {
             ensure!(*before < t, "line {number}: the time {t} s does not increase");
             let a = (v - of_before) / (t - before);
             ensure!(
                 a.abs() < MOST[1],
-                "line {number}: from {before} s to {t} s, {} m/s2 is no acceleration of a vehicle: check the units",
+                "line {number}: from {before} s to {t} s, vehicles accelerate less than {} m/s2: check the units",
                 rounded(a, 4)
             );
         }
