@@ -19,18 +19,12 @@
 //! the share g = w_h^2 psi_M^2 / (|e|^2 + w_h^2 psi_M^2) of standstill, w_h = `w_hold`,
 //!
 //! ```text
-//! theta~ = (1 - g) atan2(-s e_d, s e_q), s = sign e_q where g > 1/2
-//! dw^/dt += g' w_o / 3 (e_q / psi_M - b - w^)               g' = g where g > 0.15, 0 where g < 0.05, i.e. above 4.4 w_h
-//! db/dt = 0.06 rho (1 - g) (e_q / psi_M - b - w^), |b| <= max(w_h, |w^|) / 4 -0.06 rho b where g < 0.05
+//! theta~ = (1 - g) atan2(-s e_d, s e_q), s = sign e_q where g > 1/2        dw^/dt += g w_o / 3 (e_q / psi_M - w^)
 //! ```
 //!
 //! The angle's gain fades with the EMF, and the speed goes on through zero with e_q, so that theta^ is its integral: the
 //! error grows with the time spent there, by (R - R^) i / psi_M in rad/s. It is meant for passing through zero, not for staying
 //! there.
-//!
-//! At a constant speed, a wrong R^ or psi^ would leave e_q / psi_M beside dtheta^/dt, which is right, and w^ between the two: off by
-//! 13 % at 0.05 of the rated speed. b learns the difference, slowly, so that a reversal is over before: w^ is dtheta^/dt
-//! then, and the angle loses the error that pulled against the speed.
 
 use crate::estimator::contract::{ContextOf, Estimate, Sample, SetupOf};
 use crate::estimator::interval::Interval;
@@ -121,36 +115,13 @@ pub fn follow<All: AsRef<EmfParameters> + AsRef<TrackerParameters>>(
     tracker.follow(context, (1.0 - g) * angle_error(s, e.d(), e.q()), sample)
 }
 
-/// Share g of standstill below which the EMF does not guide the speed: above 4.4 `w_hold`.
-const FAR: f64 = 0.05;
-
-/// Width in g of the transition above [`FAR`].
-const FADE: f64 = 0.1;
-
-/// Rate at which the error of e_q / psi_M is learned, as a share of the tracker's bandwidth.
-const LEARNED: f64 = 0.06;
-
-/// Greatest learned error, as a share of the speed and of `w_hold`: a greater one would fit a frame that is half a turn off.
-const MOST: f64 = 0.25;
-
 /// Guides the speed through zero with the EMF `e` (V); returns the share g of standstill.
 #[inline]
-pub fn hold<All: AsRef<EmfParameters> + AsRef<TrackerParameters>>(
-    tracker: &mut Tracker,
-    context: &ContextOf<All>,
-    e: DqHat,
-) -> f64 {
+pub fn hold<All: AsRef<EmfParameters>>(tracker: &mut Tracker, context: &ContextOf<All>, e: DqHat) -> f64 {
     let ContextOf { motor, T_s, .. } = *context;
-    let w_hold = context.of::<EmfParameters>().w_hold;
-    let least = w_hold * motor.psi_M;
+    let least = context.of::<EmfParameters>().w_hold * motor.psi_M;
     let g = least * least / (e.dot(e) + least * least);
-    let near = g * ((g - FAR) / FADE).clamp(0.0, 1.0);
-    let slip = e.q() / motor.psi_M - tracker.bias - tracker.w;
-    tracker.w += T_s * near * context.of::<EmfParameters>().bandwidth / 3.0 * slip;
-    let rate = T_s * LEARNED * context.of::<TrackerParameters>().bandwidth;
-    let learned = tracker.bias + rate * if near > 0.0 { (1.0 - g) * slip } else { -tracker.bias };
-    let most = MOST * w_hold.max(tracker.w.abs());
-    tracker.bias = learned.clamp(-most, most);
+    tracker.w += T_s * g * context.of::<EmfParameters>().bandwidth / 3.0 * (e.q() / motor.psi_M - tracker.w);
     g
 }
 
@@ -270,8 +241,7 @@ mod tests {
             let (angle, length) = (0.1, motor.psi_M * w);
             let e = DqHat::new(-length * f64::sin(angle), length * f64::cos(angle));
             follow(&mut tracker, &mut direction, &context, e, &Sample::default());
-            let near = g * ((g - FAR) / FADE).clamp(0.0, 1.0);
-            let slow = 1e-4 * near * par.emf.bandwidth / 3.0 * (e.q() / motor.psi_M - w);
+            let slow = 1e-4 * g * par.emf.bandwidth / 3.0 * (e.q() / motor.psi_M - w);
             let expected = if w > 0.0 { (1.0 - g) * angle } else { 0.0 };
             assert!((tracker.w_frame - w - slow - 2.0 * rho * expected).abs() < 1e-9, "{w} rad/s: {tracker:?}");
             assert!((tracker.w - w - slow - 1e-4 * rho * rho * expected).abs() < 1e-9, "{w} rad/s: {tracker:?}");

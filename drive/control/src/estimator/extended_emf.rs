@@ -125,25 +125,9 @@ mod tests {
         let mut par = EstimatorParameters::default();
         (par.emf.hold_reversal, par.emf.w_hold) = (true, 80.0);
         for w in [60.0, 120.0, -60.0] {
-            let (angle, speed) = beside::<ExtendedEmf>(&par, &salient(), (w, Dq::new(-6.0, 8.0)), 0.1, 50_000);
+            let (angle, speed) = beside::<ExtendedEmf>(&par, &salient(), (w, Dq::new(-6.0, 8.0)), 0.1, 10_000);
             assert!(angle.abs().to_degrees() < 0.02, "{w} rad/s: {} deg off", angle.to_degrees());
             assert!(speed.abs() < 0.02, "{w} rad/s: {speed} rad/s off");
-        }
-    }
-
-    /// With a wrong resistance or magnet, the speed of a held reversal comes to that of the rotor.
-    #[test]
-    fn a_held_reversal_has_no_speed_error() {
-        let (motor, mut par) = (salient(), EstimatorParameters::default());
-        (par.emf.hold_reversal, par.emf.w_hold) = (true, 80.0);
-        for hat in
-            [Motor { R_s: 0.8 * motor.R_s, ..motor.clone() }, Motor { psi_M: 1.15 * motor.psi_M, ..motor.clone() }]
-        {
-            for w in [60.0, 100.0, -60.0, 300.0] {
-                let (angle, speed) = beside::<ExtendedEmf>(&par, &hat, (w, Dq::new(0.0, 4.0)), 0.1, 200_000);
-                assert!(speed.abs() < 0.02, "{w} rad/s: {speed} rad/s off");
-                assert!(angle.abs() < 1e-3, "{w} rad/s: {angle} rad off");
-            }
         }
     }
 

@@ -52,14 +52,12 @@ pub struct Tracker {
     pub w_frame: f64,
     /// Load torque in N.m (mechanical observer).
     pub tau_load: f64,
-    /// Error in rad/s of the speed that the EMF gives near standstill, where `emf.hold_reversal` uses it.
-    pub bias: f64,
 }
 
 impl Tracker {
     /// At the electrical angle `theta` (rad), turning at `w` (rad/s).
     pub fn at(theta: f64, w: f64, T_s: f64) -> Self {
-        Self { theta, theta_last: theta - w * T_s, w, w_frame: w, ..Self::default() }
+        Self { theta, theta_last: theta - w * T_s, w, w_frame: w, tau_load: 0.0 }
     }
 
     /// Advances to the next sample, `T_s` (s) later; each update calls this first.
