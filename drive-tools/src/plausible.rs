@@ -30,13 +30,16 @@ pub(crate) const PER_KELVIN: Units = &[("%/K", 1e-2), ("ppm/K", 1e-6)];
 /// Advice if nothing more precise is known.
 pub(crate) const CORRECT: &str = "correct it, or the values it is compared with";
 
+/// Multiplies a value of the file content `D`.
+pub(crate) type Convert<D> = Box<dyn Fn(&mut D, f64)>;
+
 /// A value of the file content `D`, and the ratio that shows whether it is plausible.
 pub(crate) struct Check<D> {
     pub(crate) name: &'static str,
     pub(crate) unit: &'static str,
     pub(crate) units: Units,
     /// Multiplies the value in the data, and those written with it.
-    pub(crate) convert: Box<dyn Fn(&mut D, f64)>,
+    pub(crate) convert: Convert<D>,
     pub(crate) value: f64,
     /// Offset of the value in the file, where it is known.
     pub(crate) at: Option<usize>,

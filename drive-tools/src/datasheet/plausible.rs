@@ -13,7 +13,7 @@ const TURNS: Units = &[("rad/s", 30.0 / std::f64::consts::PI), ("Hz", 60.0), ("k
 const NONE: Units = &[];
 
 /// Multiplies a value of the sheet.
-type Convert = fn(&mut SheetData, f64);
+type Scale = fn(&mut SheetData, f64);
 
 /// Checks all values; `reach` are the highest speed in rad/s and the peak torque in N.m of a sheet whose torque is that of a map.
 ///
@@ -29,29 +29,35 @@ fn most(values: &[f64]) -> f64 {
 }
 
 fn scale(values: Option<&mut Vec<f64>>, size: f64) {
-    values.into_iter().flatten().for_each(|x| *x *= size);
+    for x in values.into_iter().flatten() {
+        *x *= size;
+    }
 }
 
 fn one(value: Option<&mut f64>, size: f64) {
-    value.into_iter().for_each(|x| *x *= size);
+    if let Some(x) = value {
+        *x *= size;
+    }
 }
 
 impl Torque {
     fn scale_speeds(&mut self, size: f64) {
-        [self.rpm.as_mut(), self.speed.as_mut()].into_iter().for_each(|values| scale(values, size));
+        scale(self.rpm.as_mut(), size);
+        scale(self.speed.as_mut(), size);
     }
 
     fn scale_torques(&mut self, size: f64) {
         let Self { peak, continuous, generator, drag, .. } = self;
-        [Some(peak), continuous.as_mut(), generator.as_mut(), drag.as_mut()]
-            .into_iter()
-            .for_each(|values| scale(values, size));
+        for values in [Some(peak), continuous.as_mut(), generator.as_mut(), drag.as_mut()] {
+            scale(values, size);
+        }
     }
 }
 
 impl LossTable {
     fn scale_speeds(&mut self, size: f64) {
-        [self.rpm.as_mut(), self.speed.as_mut()].into_iter().for_each(|values| scale(values, size));
+        scale(self.rpm.as_mut(), size);
+        scale(self.speed.as_mut(), size);
     }
 }
 
@@ -109,7 +115,7 @@ fn checks(data: &SheetData, reach: Option<[f64; 2]>) -> Vec<Check<SheetData>> {
         let remedy = "an efficiency is the share that is delivered, not the share that is lost";
         ("losses.efficiency", "", NONE, "the best efficiency", (0.3, 0.998), (0.5, 0.99), remedy)
     };
-    let check = |name, unit, units, value: Option<f64>, convert: Convert, per_unit, what, range, usual| {
+    let check = |name, unit, units, value: Option<f64>, convert: Scale, per_unit, what, range, usual| {
         let (convert, remedy) = (Box::new(convert), CORRECT.into());
         value.map(|value| Check { name, unit, units, convert, value, at: None, per_unit, what, range, usual, remedy })
     };
