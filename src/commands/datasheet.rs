@@ -58,7 +58,9 @@ pub fn run(args: &Datasheet) -> Result<()> {
     if args.json {
         let (values, doubts) = datasheet::values(path)?;
         println!("{values:#}");
-        doubts.iter().for_each(|doubt| message::warning(doubt));
+        for doubt in &doubts {
+            message::warning(doubt);
+        }
         return Ok(());
     }
     let sheet = datasheet::read(path)?;
