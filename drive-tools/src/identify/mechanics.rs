@@ -4,6 +4,15 @@
 //! J [w_m] + B int(w_m) + tau_coulomb int(tanh(w_m / (0.003 w_max))) = int(tau_e - tau_load)
 //! tau_e = 1.5 n_p (psi_d i_q - psi_q i_d)
 //! ```
+//!
+//! A known load also measures the scale of the record. With its integral as a fourth regressor,
+//!
+//! ```text
+//! J [w_m] + B int(w_m) + tau_coulomb int(tanh(w_m / (0.003 w_max))) + c int(tau_load) = int(tau_e)
+//! ```
+//!
+//! c is 1 if voltages (V), currents (A) and load (N.m) are right: tau_e is proportional to voltage and current, so RMS values of one
+//! of them give c = 1/sqrt(2), and a load in mN.m gives c = 1/1000. Derived here; the other factors are in `verdict.rs`.
 
 use super::electrical::Fit;
 use super::interval::{self, Sums};
@@ -101,7 +110,7 @@ impl Shown {
         least_squares(&rows).map(|(p, half)| MechanicalFit { p, half })
     }
 
-    /// Torque of the currents for each N.m of the load, and its half-width (95 %): 1 if voltages, currents and load have one scale.
+    /// The ratio c of the torque of the currents to that of the load, and its half-width (95 %); `None` without a load.
     pub fn per_load(&self) -> Option<(f64, f64)> {
         let with_load =
             |TorqueWindow { x: [dw, w, sign], y, load, .. }: &TorqueWindow| ([*dw, *w, *sign, *load], y + load);
