@@ -131,6 +131,22 @@ mod tests {
         }
     }
 
+    /// With a wrong resistance or magnet, a held reversal still supplies the speed of the rotor, in both directions.
+    #[test]
+    fn a_held_reversal_has_no_speed_error() {
+        let (motor, mut par) = (salient(), EstimatorParameters::default());
+        (par.emf.hold_reversal, par.emf.w_hold) = (true, 80.0);
+        for hat in
+            [Motor { R_s: 0.8 * motor.R_s, ..motor.clone() }, Motor { psi_M: 1.15 * motor.psi_M, ..motor.clone() }]
+        {
+            for w in [60.0, 100.0, -60.0, 300.0] {
+                let (angle, speed) = beside::<ExtendedEmf>(&par, &hat, (w, Dq::new(0.0, 4.0)), 0.1, 50_000);
+                assert!(speed.abs() < 0.02, "{w} rad/s: {speed} rad/s off");
+                assert!(angle.abs() < 0.1, "{w} rad/s: {angle} rad off");
+            }
+        }
+    }
+
     /// tan theta~ = (R - R^) i_d / (E + (R - R^) i_q), and half a turn more where the sum has the other sign: with R^ = 2 R below 36 rad/s.
     #[test]
     fn a_wrong_resistance_turns_it_and_has_a_bound() {

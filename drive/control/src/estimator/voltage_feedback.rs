@@ -47,16 +47,16 @@ impl<All: AsRef<EmfParameters> + AsRef<TrackerParameters>> Estimating<All> for V
         let smoothing = 1.0 - pole(context.of::<EmfParameters>().bandwidth, T_s);
         self.frame += smoothing * (context.of::<EmfParameters>().slip(&x, w) * motor.L_d * x.i.q() - self.frame);
         let v_dfb = sample.u_pi.d() + self.frame;
-        let (mut s, mut fade, mut least) = (s, 1.0, context.of::<EmfParameters>().w_sign);
-        if context.of::<EmfParameters>().hold_reversal {
-            // On the q-axis, the feed-forward supplies w^ psi_M of the EMF, the PI the remainder.
-            let e_q = w * motor.psi_M + sample.u_pi.q();
-            let g = emf::hold(&mut self.tracker, context, DqHat::new(v_dfb, e_q));
-            (s, fade, least) =
-                (if g > 0.5 { 1.0_f64.copysign(e_q) } else { s }, 1.0 - g, context.of::<EmfParameters>().w_hold);
+        let &EmfParameters { hold_reversal, w_hold, w_sign, .. } = context.of();
+        let error = |s: f64, least: f64| (-s * v_dfb / (motor.psi_M * w.abs().max(least))).clamp(-CLIP, CLIP);
+        if !hold_reversal {
+            return self.tracker.follow(context, error(s, w_sign), sample);
         }
-        let e = (-s * v_dfb / (motor.psi_M * w.abs().max(least))).clamp(-CLIP, CLIP);
-        self.tracker.follow(context, fade * e, sample)
+        // On the q-axis, the feed-forward supplies w^ psi_M of the EMF, the PI the remainder.
+        let e_q = w * motor.psi_M + sample.u_pi.q();
+        let g = emf::hold(&mut self.tracker, context, DqHat::new(v_dfb, e_q));
+        let s = if g > 0.5 { 1.0_f64.copysign(e_q) } else { s };
+        self.direction.follow(&mut self.tracker, context, (g, (1.0 - g) * error(s, w_hold)), sample)
     }
 
     fn validate(setup: &SetupOf<All>) -> Result<(), Fault> {
