@@ -29,12 +29,14 @@ pub struct VoltageFeedback {
     direction: Direction,
     /// Smoothed frame-speed voltage in V.
     frame: f64,
+    /// Speed in rad/s that it supplied, which is in the feed-forward.
+    w: f64,
 }
 
 impl<All: AsRef<EmfParameters> + AsRef<TrackerParameters>> Estimating<All> for VoltageFeedback {
     fn start(context: &ContextOf<All>, sample: &Sample, theta: f64, w: f64) -> (Self, Estimate) {
         let tracker = Tracker::at(theta, w, context.T_s);
-        (Self { tracker, direction: Direction::of(w), frame: 0.0 }, Estimate::new(theta, w, sample))
+        (Self { tracker, direction: Direction::of(w), frame: 0.0, w }, Estimate::new(theta, w, sample))
     }
 
     #[inline]
@@ -42,21 +44,24 @@ impl<All: AsRef<EmfParameters> + AsRef<TrackerParameters>> Estimating<All> for V
         let ContextOf { motor, T_s, .. } = *context;
         self.tracker.advance(T_s);
         let x = Interval::new(self.tracker.theta_last, self.tracker.theta, sample, T_s);
-        let w = self.tracker.w;
+        let w = self.w;
         let s = self.direction.update(w, context.of::<EmfParameters>().w_sign);
         let smoothing = 1.0 - pole(context.of::<EmfParameters>().bandwidth, T_s);
         self.frame += smoothing * (context.of::<EmfParameters>().slip(&x, w) * motor.L_d * x.i.q() - self.frame);
         let v_dfb = sample.u_pi.d() + self.frame;
         let &EmfParameters { hold_reversal, w_hold, w_sign, .. } = context.of();
         let error = |s: f64, least: f64| (-s * v_dfb / (motor.psi_M * w.abs().max(least))).clamp(-CLIP, CLIP);
-        if !hold_reversal {
-            return self.tracker.follow(context, error(s, w_sign), sample);
-        }
-        // On the q-axis, the feed-forward supplies w^ psi_M of the EMF, the PI the remainder.
-        let e_q = w * motor.psi_M + sample.u_pi.q();
-        let g = emf::hold(&mut self.tracker, context, DqHat::new(v_dfb, e_q));
-        let s = if g > 0.5 { 1.0_f64.copysign(e_q) } else { s };
-        self.direction.follow(&mut self.tracker, context, (g, (1.0 - g) * error(s, w_hold)), sample)
+        let estimate = if hold_reversal {
+            // On the q-axis, the feed-forward supplies w^ psi_M of the EMF, the PI the remainder.
+            let e_q = w * motor.psi_M + sample.u_pi.q();
+            let g = emf::hold(&mut self.tracker, context, DqHat::new(v_dfb, e_q));
+            let s = if g > 0.5 { 1.0_f64.copysign(e_q) } else { s };
+            self.direction.follow(&mut self.tracker, context, (g, (1.0 - g) * error(s, w_hold)), sample)
+        } else {
+            self.tracker.follow(context, error(s, w_sign), sample)
+        };
+        self.w = estimate.w;
+        estimate
     }
 
     fn validate(setup: &SetupOf<All>) -> Result<(), Fault> {
