@@ -278,3 +278,20 @@ fn both_begin_again_at_the_speed_that_is_left() {
         assert!(off[0] < 0.08 && off[1] < 0.01 && off[2] < 0.02, "{what:?}: {off:?}");
     }
 }
+
+/// The extended EMF with R^ = 0.9 R, near standstill: the shaft turns at its reference, not at the speed of the wrong EMF.
+#[test]
+fn a_slow_drive_turns_at_its_reference() {
+    for name in ["traction-63kw", "traction-100kw", "ipmsm-2.2kw"] {
+        for load in [0.0, 0.7] {
+            let case = case((name, Kind::ExtendedEmf), |_, _, _| ());
+            let (w, torque) = (0.05 * case.speed, load * case.torque);
+            let (seen, said) = case.drive(6.0, &move |t, i: &mut DriveInputs| {
+                i.speed_ref = w;
+                i.tau_load = if t > 2.5 { torque } else { 0.0 };
+            });
+            assert!(said.is_empty(), "{name}, load {load}: {said:?}");
+            assert!((at(&seen, 5.9).speed / w - 1.0).abs() < 2e-3, "{name}, load {load}: {:?}", at(&seen, 5.9));
+        }
+    }
+}
