@@ -220,16 +220,16 @@ impl PmsmDrive {
         *overload = overload.followed_by(acts && (*tau_load > FAR * tau_max || *tau_load < FAR * tau_min));
     }
 
-    /// Watches the estimate after a step of `h` (s).
-    fn watch_estimate(&mut self, h: f64) {
-        let Pair { plant, controller, .. } = &self.pair;
-        let ControllerOutputs { start_state, enabled, theta_est, speed_est, .. } = controller.out;
+    /// Watches the estimate after a step of `h` (s), at whose end the rotor has the electrical angle `theta_e` (rad) and the `speed`
+    /// (rad/s).
+    fn watch_estimate(&mut self, h: f64, (theta_e, speed): (f64, f64)) {
+        let ControllerOutputs { start_state, enabled, theta_est, speed_est, .. } = self.pair.controller.out;
         if !enabled || start_state != StartState::Running {
             self.slip = Slip::default();
             return;
         }
-        let faster = f64::from(plant.model.parameters.motor.n_p) * (speed_est - plant.out.speed);
-        self.slip.count(h, theta_est - plant.out.theta_e, faster);
+        let faster = f64::from(self.pair.plant.model.parameters.motor.n_p) * (speed_est - speed);
+        self.slip.count(h, theta_est - theta_e, faster);
     }
 }
 
@@ -394,7 +394,7 @@ impl Model for PmsmDrive {
         }
         pair.output();
         self.watch_load();
-        self.watch_estimate(step.h);
+        self.watch_estimate(step.h, (self.pair.plant.out.theta_e, self.pair.plant.out.speed));
         Ok(())
     }
 }

@@ -5,7 +5,7 @@
 use drive::control::estimator::Kind;
 use drive::{MappedDrive, PmsmDrive, PmsmDriveMean};
 use fmu_core::log::{Said, Warnings};
-use fmu_core::{Block, Elapsed, Model, Step, Warns};
+use fmu_core::{Block, Elapsed, Model, Step, Warns, integrate};
 
 /// The first message about the load in 4 s with the speed references 50 rad/s, -50 rad/s after 2 s and the load `tau` (N.m) from 0.8 s on.
 fn message<M: Model + Warns>(mut block: Block<M>, tau: f64, set: fn(&mut M, f64, f64)) -> Option<String> {
@@ -96,8 +96,8 @@ fn a_speed_beyond_the_voltage_is_reported() {
 }
 
 /// Whether the drive with this estimator says that it has lost the rotor, under a load (N.m) from 0.8 s on; blind: `lock_lost` reports
-/// nothing.
-fn slips(estimator: Kind, blind: bool, tau: f64) -> Option<String> {
+/// nothing; exchange: in Model Exchange.
+fn slips(estimator: Kind, blind: bool, exchange: bool, tau: f64) -> Option<String> {
     let (mut block, mut now, mut said) = (Block::<PmsmDrive>::default(), Elapsed::ZERO, None);
     let par = &mut block.model.pair.controller.model.parameters;
     par.estimator = estimator;
@@ -109,7 +109,11 @@ fn slips(estimator: Kind, blind: bool, tau: f64) -> Option<String> {
         let inputs = &mut block.model.inputs;
         (inputs.speed_ref, inputs.tau_load) = (if k < 2000 { 100.0 } else { -100.0 }, if k < 800 { 0.0 } else { tau });
         let step = Step { start: now, h: 1e-3 };
-        block.step(&step).unwrap();
+        if exchange {
+            integrate::hybrid::<PmsmDrive, 5>(&mut block.model, &step, 50e-6).unwrap();
+        } else {
+            block.step(&step).unwrap();
+        }
         now = step.end();
         block.model.warn(&mut Warnings::to(&mut |(_, key, text): Said<'_>| {
             if key == "slip" {
@@ -122,10 +126,14 @@ fn slips(estimator: Kind, blind: bool, tau: f64) -> Option<String> {
 
 #[test]
 fn a_rotor_that_the_controller_believes_to_have_is_reported() {
-    let said = slips(Kind::FluxObserver, true, 2.5).unwrap();
-    println!("{said}");
-    assert!(said.contains("the estimate has lost the rotor") && said.contains("speed_est = "), "{said}");
+    for exchange in [false, true] {
+        let said = slips(Kind::FluxObserver, true, exchange, 2.5).unwrap();
+        println!("{said}");
+        assert!(said.contains("the estimate has lost the rotor") && said.contains("speed_est = "), "{said}");
+    }
     for estimator in [Kind::Rasmussen, Kind::VoltageModel, Kind::ExtendedEmf, Kind::KalmanFilter, Kind::Sensored] {
-        assert_eq!(slips(estimator, false, 1.0), None, "{estimator:?}");
+        for exchange in [false, true] {
+            assert_eq!(slips(estimator, false, exchange, 1.0), None, "{estimator:?}, exchange: {exchange}");
+        }
     }
 }

@@ -185,10 +185,12 @@ impl Events for PmsmDrive {
             let Pair { plant, controller, .. } = &mut self.pair;
             let mut inputs = plant.model.inputs.clone();
             inputs.apply(self.before);
-            controller.model.inputs.measure(plant.model.measured_under(&inputs));
+            let measured = plant.model.measured_under(&inputs);
+            controller.model.inputs.measure(measured);
             controller.model.sample()?;
             self.before = plant.model.inputs.commanded();
             self.watch_load();
+            self.watch_estimate(grid.period, (measured.theta_e, measured.speed));
         }
         self.pair.plant.model.event(now)
     }
