@@ -11,6 +11,7 @@
 // The papers' symbols keep their case: psi_M, R_s, L_d, T_s.
 #![allow(non_snake_case)]
 
+mod apart;
 pub mod beginning;
 pub mod dc_link;
 pub mod derating;

@@ -21,6 +21,7 @@ pub use inputs::DriveInputs;
 pub(crate) use inputs::INPUTS;
 pub use period::Means;
 
+use crate::apart;
 use crate::beginning::{BEGINNING, BeginningParameters};
 use crate::dc_link::ripple::ripple;
 use crate::dc_link::{LINK, LINK_OUTPUTS, Link, LinkOutputs, LinkParameters};
@@ -433,7 +434,10 @@ impl Warns for PmsmDrive {
             log.warn("initial.steady", || self.unsettled_message());
         }
         if self.pair.now.seconds() <= 1.0 {
-            for (key, message) in [("T_pwm", self.pair.skips_commands()), ("i_zero", self.pair.wrong_zone())] {
+            let apart = apart::message(&plant.parameters, &self.pair.controller.model.parameters);
+            let messages =
+                [("T_pwm", self.pair.skips_commands()), ("i_zero", self.pair.wrong_zone()), ("apart", apart)];
+            for (key, message) in messages {
                 if let Some(message) = message {
                     log.warn(key, || message.clone());
                 }

@@ -254,12 +254,14 @@ pub(crate) fn dc_limits(par: &ControllerParameters) -> Result<(), Fault> {
 }
 
 impl ControllerParameters {
-    /// Checks the limits of the DC link and of the trips, on a DC link of `u_dc` (V) at the start, or 0 later.
+    /// Checks the bandwidth of the current and the limits of the DC link and of the trips, on a DC link of `u_dc` (V) at the start, or 0
+    /// later.
     ///
     /// # Errors
-    /// A limit of the wrong sign, or a trip that normal operation would reach.
+    /// A bandwidth too high for the sample period, a limit of the wrong sign, or a trip that normal operation would reach.
     pub fn validate_limits(&self, u_dc: f64) -> Result<(), Fault> {
         trip(self, u_dc)?;
+        current(self)?;
         dc_limits(self)
     }
 }

@@ -155,8 +155,8 @@ impl Model for MappedDrive {
         self.energy.add(&energy);
         let point = self.point(&state);
         let speeds = [&self.state, &state].map(|state| self.speed(state));
-        let limited = self.is_active() && !self.speed_loop.torque_mode;
-        let limited = limited && Overload::limited(state.tau, point.limits, state.speed_ref - speeds[1]);
+        let controls = self.is_active() && !self.speed_loop.torque_mode;
+        let limited = controls.then(|| Overload::limited(state.tau, point.limits, state.speed_ref - speeds[1]));
         self.load.update(step.h, limited, state.speed_ref, speeds);
         self.state = state;
         self.last = self.instant(&state, &point);

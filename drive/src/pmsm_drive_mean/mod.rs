@@ -31,6 +31,7 @@ mod motion;
 mod show;
 mod supply;
 
+use crate::apart;
 use crate::beginning::{BEGINNING, BeginningParameters};
 use crate::dc_link::{LINK, LinkEnergy, LinkParameters};
 use crate::derating::DERATING;
@@ -263,7 +264,7 @@ impl PmsmDriveMean {
         let error = state.speed_ref - speeds[1];
         let speed_mode = self.gates() && !self.torque_mode();
         let mut overload = self.overload;
-        let limited = speed_mode && Overload::limited(state.tau, self.narrowed(state, point), error);
+        let limited = speed_mode.then(|| Overload::limited(state.tau, self.narrowed(state, point), error));
         overload.update(h, limited, state.speed_ref, speeds);
         overload
     }
@@ -502,6 +503,9 @@ impl Warns for PmsmDriveMean {
         }
         self.drive.derating.warn(log);
         let plant = &self.drive.plant;
+        if let Some(message) = apart::message(plant, &self.drive.controller) {
+            log.warn("apart", || message.clone());
+        }
         plant.thermal.warn(&self.inputs.thermal, log);
         plant.inverter.warn(log);
         if !plant.is_linear() {
