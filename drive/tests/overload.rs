@@ -7,8 +7,8 @@ use drive::{MappedDrive, PmsmDrive, PmsmDriveMean};
 use fmu_core::log::{Said, Warnings};
 use fmu_core::{Block, Elapsed, Model, Step, Warns, integrate};
 
-/// The first message about the load in 4 s with the speed references 50 rad/s, -50 rad/s after 2 s and the load `tau` (N.m) from 0.8 s on.
-fn message<M: Model + Warns>(mut block: Block<M>, tau: f64, set: fn(&mut M, f64, f64)) -> Option<String> {
+/// The first message with this key in 4 s with the speed references 50 rad/s, -50 rad/s after 2 s and the load `tau` (N.m) from 0.8 s on.
+fn message<M: Model + Warns>(key: &str, mut block: Block<M>, tau: f64, set: fn(&mut M, f64, f64)) -> Option<String> {
     let (mut now, mut said) = (Elapsed::ZERO, None);
     for k in 0..4000 {
         set(&mut block.model, if k < 2000 { 50.0 } else { -50.0 }, if k < 800 { 0.0 } else { tau });
@@ -19,8 +19,8 @@ fn message<M: Model + Warns>(mut block: Block<M>, tau: f64, set: fn(&mut M, f64,
         let step = Step { start: now, h: 1e-3 };
         block.step(&step).unwrap();
         now = step.end();
-        let mut sink = |(_, key, text): Said<'_>| {
-            if key == "overload" {
+        let mut sink = |(_, found, text): Said<'_>| {
+            if found == key {
                 said.get_or_insert_with(text);
             }
         };
@@ -44,17 +44,41 @@ fn a_load_above_the_torque_is_reported() {
         check(&format!("{estimator:?}"), "tau_max = 4.05", |tau| {
             let mut block = Block::<PmsmDrive>::default();
             block.model.pair.controller.model.parameters.estimator = estimator;
-            message(block, tau, |m, speed, tau| (m.inputs.speed_ref, m.inputs.tau_load) = (speed, tau))
+            message("overload", block, tau, |m, speed, tau| (m.inputs.speed_ref, m.inputs.tau_load) = (speed, tau))
         });
     }
     check("mean", "tau_max = 4.05", |tau| {
         let set = |m: &mut PmsmDriveMean, speed, tau| (m.inputs.speed_ref, m.inputs.tau_load) = (speed, tau);
-        message(Block::<PmsmDriveMean>::default(), tau, set)
+        message("overload", Block::<PmsmDriveMean>::default(), tau, set)
     });
     check("mapped", "tau_max = 6.0", |tau| {
         let set = |m: &mut MappedDrive, speed, tau| (m.inputs.speed_ref, m.inputs.tau_load) = (speed, tau);
-        message(Block::<MappedDrive>::default(), tau, set)
+        message("overload", Block::<MappedDrive>::default(), tau, set)
     });
+}
+
+/// A load of a quarter of the torque drives a shaft backward whose speed loop is a thousandth as strong; a usual loop holds it.
+#[test]
+fn a_loop_too_weak_for_its_load_is_reported() {
+    for (share, reported) in [(1e-3, true), (1.0, false)] {
+        let mut drive = Block::<PmsmDrive>::default();
+        drive.model.pair.controller.model.parameters.estimator = Kind::Sensored;
+        drive.model.pair.controller.model.parameters.speed_loop.bandwidth *= share;
+        let set = |m: &mut PmsmDrive, speed, tau| (m.inputs.speed_ref, m.inputs.tau_load) = (speed, tau);
+        let mut said = vec![message("speed_loop", drive, 1.0, set)];
+        let mut mean = Block::<PmsmDriveMean>::default();
+        mean.model.drive.controller.speed_loop.bandwidth *= share;
+        let set = |m: &mut PmsmDriveMean, speed, tau| (m.inputs.speed_ref, m.inputs.tau_load) = (speed, tau);
+        said.push(message("speed_loop", mean, 1.0, set));
+        let mut mapped = Block::<MappedDrive>::default();
+        mapped.model.speed_loop.bandwidth *= share;
+        let set = |m: &mut MappedDrive, speed, tau| (m.inputs.speed_ref, m.inputs.tau_load) = (speed, tau);
+        said.push(message("speed_loop", mapped, 1.0, set));
+        for text in said {
+            assert_eq!(text.is_some(), reported, "{share}: {text:?}");
+            assert!(text.is_none_or(|text| text.contains("the speed runs away from speed_ref = 50 rad/s")), "{share}");
+        }
+    }
 }
 
 /// The message about a speed reference (rad/s) that is not reached, in 12 s.
