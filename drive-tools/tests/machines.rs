@@ -185,7 +185,7 @@ fn the_highest_speed_sets_the_sample_period() {
 
 #[test]
 fn a_start_that_fails_is_told() {
-    let limits = announced(&changed("traction-63kw", 30.0, ""), 4);
+    let limits = announced(&changed("pmsyrm-5.5kw", 10.0, ""), 4);
     assert_eq!(limits.len(), 1, "{limits:?}");
     assert!(limits[0].what == What::Start && limits[0].level < 0.2 && !limits[0].cures.is_empty(), "{limits:?}");
     let text = limits[0].to_string();

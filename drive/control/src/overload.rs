@@ -5,7 +5,7 @@
 //! away = (speed at the beginning of the limit - speed) sign(speed_ref - speed)          > 0: the error grows although the limit acts
 //! reported: away > |speed_ref|/2 + 1 rad/s once it has grown for 1 s, or at once away > 1.2 |speed_ref| + 10 rad/s, beyond standstill
 //! reported: |speed_ref - speed| > |speed_ref|/50 + 1/2 rad/s whose minimum over 0.5 s is the same three times, to |speed_ref|/500
-//! reported, with or without a limit: the speed has the other sign than speed_ref, |speed| > |speed_ref|/5 + 10 rad/s, and grows for 1 s
+//! reported without the limit: the speed is against speed_ref, |speed| > |speed_ref|/5 + 10 rad/s, and has grown for 1 s
 //! ```
 //!
 //! A start, a load step and a reversal run at the limit too, but there the error falls, or grows for less than that. Derived here;
@@ -36,7 +36,8 @@ pub struct Overload {
     acts: bool,
     from: f64,
     below: bool,
-    /// Maximum distance from that speed, and the time in s in which it has grown.
+    /// Maximum distance from that speed, or without the limit from standstill against the direction of the reference, and the time in
+    /// s in which it has grown.
     farthest: f64,
     time: f32,
     /// Whether the speed has run away, and the time in s since then, or before that the time since the limit last acted.
@@ -48,9 +49,6 @@ pub struct Overload {
     nearest: f32,
     last: f32,
     span: f32,
-    /// Greatest speed against the direction of the reference, and the time in s in which it has grown.
-    backward: f32,
-    driven: f32,
 }
 
 impl Overload {
@@ -59,26 +57,25 @@ impl Overload {
     #[expect(clippy::inline_always, reason = "the compiler would call it")]
     #[inline(always)]
     pub fn update(&mut self, h: f64, limited: Option<bool>, speed_ref: f64, speeds: [f64; 2]) {
-        if speeds[1] * speed_ref < 0.0 {
-            self.turns_back(h, limited.is_some(), speed_ref, speeds[1]);
-        }
         if limited == Some(true) {
             self.at_limit(h, speed_ref, speeds);
         } else if self.acts {
             self.since += short(h);
             if self.is || self.since > BREAK {
-                *self = Self { backward: self.backward, driven: self.driven, ..Self::default() };
+                *self = Self::default();
             }
+        } else if speeds[1] * speed_ref < 0.0 || self.time > 0.0 {
+            self.turns_back(h, limited.is_some(), speed_ref, speeds[1]);
         }
     }
 
     #[inline(never)]
     fn turns_back(&mut self, h: f64, controls: bool, speed_ref: f64, speed: f64) {
-        let turns = short(speed.abs());
-        if !controls || turns <= short(0.2 * speed_ref.abs() + 10.0) {
-            (self.backward, self.driven) = (0.0, 0.0);
-        } else if turns > self.backward {
-            (self.backward, self.driven) = (turns, self.driven + short(h));
+        let backward = -speed * speed_ref.signum();
+        if !controls || backward <= 0.2 * speed_ref.abs() + 10.0 {
+            (self.farthest, self.time) = (0.0, 0.0);
+        } else if backward > self.farthest {
+            (self.farthest, self.time) = (backward, self.time + short(h));
         }
     }
 
@@ -120,7 +117,7 @@ impl Overload {
 
     /// Whether it has just been found that the load turns the shaft backward.
     fn is_driven(&self) -> bool {
-        (LONG..LONG + SAID).contains(&self.driven)
+        !self.acts && (LONG..LONG + SAID).contains(&self.time)
     }
 
     /// Whether it has just been found that the speed stays away from its reference `speed_ref` (rad/s).
