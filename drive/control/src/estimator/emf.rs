@@ -31,7 +31,7 @@
 //! the estimator supplies w^ + f y instead of w^, with f = 1 for g < 0.75 and f = 0 for g > 0.85, linear between them:
 //!
 //! ```text
-//! dy/dt = rho / 10 (f (w_f - w^) - y), |w_f - w^| limited to max(w_h, |w^|) / 4
+//! dy/dt = 0.03 rho (f (w_f - w^) - y), |w_f - w^| limited to max(w_h, |w^|) / 4
 //! ```
 
 use crate::estimator::contract::{ContextOf, Estimate, Sample, SetupOf};
@@ -95,7 +95,7 @@ const STANDS: f64 = 0.85;
 const FADE: f64 = 0.1;
 
 /// Bandwidth of the smoothed slip as a share of the tracker's.
-const SMOOTH: f64 = 0.1;
+const SMOOTH: f64 = 0.03;
 
 /// Greatest slip as a share of the speed and of `w_hold`.
 const MOST: f64 = 0.25;
