@@ -64,11 +64,12 @@ impl Overload {
             if self.is || self.since > BREAK {
                 *self = Self::default();
             }
-        } else if speeds[1] * speed_ref < 0.0 || self.time > 0.0 {
+        } else if speeds[1] * speed_ref < 0.0 {
             self.turns_back(h, limited.is_some(), speed_ref, speeds[1]);
         }
     }
 
+    #[cold]
     #[inline(never)]
     fn turns_back(&mut self, h: f64, controls: bool, speed_ref: f64, speed: f64) {
         let backward = -speed * speed_ref.signum();
@@ -116,8 +117,8 @@ impl Overload {
     }
 
     /// Whether it has just been found that the load turns the shaft backward.
-    fn is_driven(&self) -> bool {
-        !self.acts && (LONG..LONG + SAID).contains(&self.time)
+    fn is_driven(&self, [speed, speed_ref]: [f64; 2]) -> bool {
+        !self.acts && speed * speed_ref < 0.0 && (LONG..LONG + SAID).contains(&self.time)
     }
 
     /// Whether it has just been found that the speed stays away from its reference `speed_ref` (rad/s).
@@ -136,7 +137,7 @@ impl Overload {
                      limits of the drive's current and torque"
                 )
             });
-        } else if self.is_driven() {
+        } else if self.is_driven([speed, speed_ref]) {
             log.warn("speed_loop", || {
                 format!(
                     "the speed runs away from speed_ref = {speed_ref} rad/s and is {speed:.1} rad/s: the speed loop is too weak for its load, or \
@@ -200,7 +201,7 @@ mod tests {
             (0..60).any(|k| {
                 let (speed_ref, speed) = f(f64::from(k));
                 overload.update(0.1, controls.then_some(false), speed_ref, [speed; 2]);
-                overload.is_driven()
+                overload.is_driven([speed, speed_ref])
             })
         };
         assert!(driven(true, |k| (50.0, 50.0 - 2.5 * k)), "slowly");
