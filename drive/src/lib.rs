@@ -12,10 +12,12 @@
 #![allow(non_snake_case)]
 
 mod apart;
+mod backward;
 pub mod beginning;
 pub mod dc_link;
 pub mod derating;
 pub mod documentation;
+mod happened;
 mod idle;
 mod lag;
 pub mod mapped_drive;

@@ -22,10 +22,12 @@ pub(crate) use inputs::INPUTS;
 pub use period::Means;
 
 use crate::apart;
+use crate::backward::Backward;
 use crate::beginning::{BEGINNING, BeginningParameters};
 use crate::dc_link::ripple::ripple;
 use crate::dc_link::{LINK, LINK_OUTPUTS, Link, LinkOutputs, LinkParameters};
 use crate::derating::{DERATING, Derating};
+use crate::happened::Happened;
 use crate::idle;
 use crate::pair::Pair;
 use crate::rules::{known_carrier, same_pole_pairs};
@@ -103,28 +105,8 @@ pub struct PmsmDrive {
     following: Following,
     /// The estimate beside the rotor, over communication steps.
     slip: Slip,
-}
-
-/// Occurrence of a condition that is reported once, such as a load far above the torque of the drive.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
-pub(crate) enum Happened {
-    #[default]
-    Never,
-    /// First occurrence, at the last step.
-    Now,
-    /// Occurred earlier.
-    Before,
-}
-
-impl Happened {
-    /// The next value after a step; `is`: whether the condition was met in it.
-    pub(crate) fn followed_by(self, is: bool) -> Self {
-        match self {
-            Self::Never if is => Self::Now,
-            Self::Now => Self::Before,
-            same => same,
-        }
-    }
+    /// The shaft against the direction of its reference, over communication steps.
+    backward: Backward,
 }
 
 /// Load, as a multiple of `tau_max`, above which it is reported.
@@ -225,7 +207,10 @@ impl PmsmDrive {
     /// (rad/s).
     fn watch_estimate(&mut self, h: f64, (theta_e, speed): (f64, f64)) {
         let ControllerOutputs { start_state, enabled, theta_est, speed_est, .. } = self.pair.controller.out;
-        if !enabled || start_state != StartState::Running {
+        let works = enabled && start_state == StartState::Running;
+        let controls = works && !self.pair.controller.model.parameters.speed_loop.torque_mode;
+        self.backward.update(h, controls, self.inputs.speed_ref, speed);
+        if !works {
             self.slip = Slip::default();
             return;
         }
@@ -305,7 +290,7 @@ impl Model for PmsmDrive {
         self.period = Period::new(self.pair.plant.out.powers);
         self.overload = Happened::default();
         self.following = Following::default();
-        self.slip = Slip::default();
+        (self.slip, self.backward) = (Slip::default(), Backward::default());
         self.before = self.pair.plant.model.inputs.commanded();
         self.unsettled = self.begins_steadily() && !self.begin_steady();
         self.convert_limits();
@@ -445,6 +430,7 @@ impl Warns for PmsmDrive {
         }
         plant.warn(log);
         self.derating.warn(log);
+        self.backward.warn(self.inputs.speed_ref, speed, log);
         self.following.warn(self.inputs.angle_shaft, self.inputs.speed_shaft, log);
         if lock_lost < 1.0 && self.slip.is_lost() {
             let speed_est = self.pair.controller.out.speed_est;

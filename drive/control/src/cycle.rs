@@ -201,7 +201,7 @@ impl SensorlessController {
         if self.parameters.speed_loop.torque_mode {
             self.state.stands.update(&self.parameters, mode == Mode::ClosedLoop, speed, i_ref, at_most(low, high));
         } else {
-            let limited = (mode == Mode::ClosedLoop).then_some(current_limited);
+            let limited = current_limited && mode == Mode::ClosedLoop;
             self.state.overload.update(self.parameters.T_s, limited, self.state.w_ref, [speed; 2]);
         }
         let Modulated { u, voltage_limited, cut, u_share } = self.modulate(mode, &frame, sample, i_ref, tuned);

@@ -1,11 +1,10 @@
-//! Watch in speed control for a speed that the drive cannot reach: at the limit of its torque, the speed runs away under a load, or stays
-//! where it is; below the limit, the load turns the shaft backward, because the loop is too weak.
+//! Watch in speed control for a speed that the drive cannot reach, at the limit of its torque: the speed runs away under a load, or stays
+//! where it is.
 //!
 //! ```text
 //! away = (speed at the beginning of the limit - speed) sign(speed_ref - speed)          > 0: the error grows although the limit acts
 //! reported: away > |speed_ref|/2 + 1 rad/s once it has grown for 1 s, or at once away > 1.2 |speed_ref| + 10 rad/s, beyond standstill
 //! reported: |speed_ref - speed| > |speed_ref|/50 + 1/2 rad/s whose minimum over 0.5 s is the same three times, to |speed_ref|/500
-//! reported without the limit: the speed is against speed_ref, |speed| > |speed_ref|/5 + 10 rad/s, and has grown for 1 s
 //! ```
 //!
 //! A start, a load step and a reversal run at the limit too, but there the error falls, or grows for less than that. Derived here;
@@ -36,8 +35,7 @@ pub struct Overload {
     acts: bool,
     from: f64,
     below: bool,
-    /// Maximum distance from that speed, or without the limit from standstill against the direction of the reference, and the time in
-    /// s in which it has grown.
+    /// Maximum distance from that speed, and the time in s in which it has grown.
     farthest: f64,
     time: f32,
     /// Whether the speed has run away, and the time in s since then, or before that the time since the limit last acted.
@@ -52,31 +50,18 @@ pub struct Overload {
 }
 
 impl Overload {
-    /// After an interval of `h` (s) between two speeds, in which a torque limit acted (`limited`) against the error of the speed or
-    /// did not; `None`: without speed control.
+    /// After an interval of `h` (s) from the speed `before` to `speed`, in which a torque limit acted (`limited`) against the
+    /// error of the speed.
     #[expect(clippy::inline_always, reason = "the compiler would call it")]
     #[inline(always)]
-    pub fn update(&mut self, h: f64, limited: Option<bool>, speed_ref: f64, speeds: [f64; 2]) {
-        if limited == Some(true) {
+    pub fn update(&mut self, h: f64, limited: bool, speed_ref: f64, speeds: [f64; 2]) {
+        if limited {
             self.at_limit(h, speed_ref, speeds);
         } else if self.acts {
             self.since += short(h);
             if self.is || self.since > BREAK {
                 *self = Self::default();
             }
-        } else if speeds[1] * speed_ref < 0.0 {
-            self.turns_back(h, limited.is_some(), speed_ref, speeds[1]);
-        }
-    }
-
-    #[cold]
-    #[inline(never)]
-    fn turns_back(&mut self, h: f64, controls: bool, speed_ref: f64, speed: f64) {
-        let backward = -speed * speed_ref.signum();
-        if !controls || backward <= 0.2 * speed_ref.abs() + 10.0 {
-            (self.farthest, self.time) = (0.0, 0.0);
-        } else if backward > self.farthest {
-            (self.farthest, self.time) = (backward, self.time + short(h));
         }
     }
 
@@ -116,11 +101,6 @@ impl Overload {
         self.is && self.since < SAID
     }
 
-    /// Whether it has just been found that the load turns the shaft backward.
-    fn is_driven(&self, [speed, speed_ref]: [f64; 2]) -> bool {
-        !self.acts && speed * speed_ref < 0.0 && (LONG..LONG + SAID).contains(&self.time)
-    }
-
     /// Whether it has just been found that the speed stays away from its reference `speed_ref` (rad/s).
     fn stays(&self, speed_ref: f64) -> bool {
         !self.is && self.same == 2 && self.last > short(0.02 * speed_ref.abs() + 0.5)
@@ -135,14 +115,6 @@ impl Overload {
                     "the load exceeds the torque of the drive: at tau_min = {low:.4} N.m and tau_max = {high:.4} N.m, the speed runs away \
                      from speed_ref = {speed_ref} rad/s and is {speed:.1} rad/s; lower the load, check that it is in N.m, or raise the \
                      limits of the drive's current and torque"
-                )
-            });
-        } else if self.is_driven([speed, speed_ref]) {
-            log.warn("speed_loop", || {
-                format!(
-                    "the speed runs away from speed_ref = {speed_ref} rad/s and is {speed:.1} rad/s: the speed loop is too weak for its load, or \
-                     the torque is not what the controller expects; check speed_loop.bandwidth, mechanics.J and the motor's data in the \
-                     controller"
                 )
             });
         } else if self.stays(speed_ref) {
@@ -166,7 +138,7 @@ mod tests {
     fn seen(run: impl IntoIterator<Item = (f64, f64, bool)>) -> (bool, bool) {
         let (mut overload, mut before, mut any, mut stays) = (Overload::default(), None, false, false);
         for (speed_ref, speed, limited) in run {
-            overload.update(0.1, Some(limited), speed_ref, [before.unwrap_or(speed), speed]);
+            overload.update(0.1, limited, speed_ref, [before.unwrap_or(speed), speed]);
             (before, any) = (Some(speed), any || overload.runs_away());
             stays |= overload.stays(speed_ref);
         }
@@ -192,26 +164,5 @@ mod tests {
         assert_eq!(steps(|k| (50.0, 40.0 - k % 2.0, true)), stays, "with an oscillation");
         assert_eq!(steps(|k| (50.0, (4.0 * k).min(48.7), true)), none, "almost reached");
         assert_eq!(steps(|k| (50.0, 45.0, k % 8.0 > 0.0)), none, "limited for less than a second at a time");
-    }
-
-    #[test]
-    fn a_shaft_that_the_load_turns_backward_is_seen_without_a_limit() {
-        let driven = |controls: bool, f: fn(f64) -> (f64, f64)| {
-            let mut overload = Overload::default();
-            (0..60).any(|k| {
-                let (speed_ref, speed) = f(f64::from(k));
-                overload.update(0.1, controls.then_some(false), speed_ref, [speed; 2]);
-                overload.is_driven([speed, speed_ref])
-            })
-        };
-        assert!(driven(true, |k| (50.0, 50.0 - 2.5 * k)), "slowly");
-        assert!(driven(true, |k| (-50.0, -50.0 + 10.0 * k)), "the same in reverse");
-        assert!(!driven(false, |k| (50.0, 50.0 - 10.0 * k)), "in torque control, or with the gates off");
-        assert!(!driven(true, |k| (0.0, -2.0 * k)), "no direction to hold");
-        assert!(!driven(true, |k| (50.0, -100.0 + 3.0 * k)), "a reversal");
-        assert!(
-            !driven(true, |k| (50.0, if k < 14.0 { 50.0 - 6.0 * k } else { 10.0 + k })),
-            "a load step that the loop overcomes"
-        );
     }
 }

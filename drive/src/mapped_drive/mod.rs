@@ -27,7 +27,8 @@ mod state;
 
 pub use state::{MappedDrive, MappedInputs, MappedOutputs, MappedShaft};
 
-use crate::pmsm_drive::Happened;
+use crate::backward::Backward;
+use crate::happened::Happened;
 use drive_base::math::all_finite;
 use drive_control::idle::NO_VOLTAGE;
 use drive_control::model::clipped;
@@ -117,7 +118,7 @@ impl Model for MappedDrive {
 
     const ICON: Option<&'static str> = Some(include_str!("../../icons/pmsm_drive.svg"));
 
-    const STATE_VERSION: u16 = 4;
+    const STATE_VERSION: u16 = 5;
 
     const CONTINUOUS: bool = true;
 
@@ -139,7 +140,7 @@ impl Model for MappedDrive {
         (self.energy, self.active) = (Energy::default(), self.is_active());
         self.last = self.instant(&self.state, &self.point(&self.state));
         (self.overspeed, self.off_voltage, self.clipped_for) = (Happened::default(), Happened::default(), 0.0);
-        self.load = Overload::default();
+        (self.load, self.backward) = (Overload::default(), Backward::default());
     }
 
     fn output(&self, _now: Elapsed, out: &mut MappedOutputs) {
@@ -156,7 +157,8 @@ impl Model for MappedDrive {
         let point = self.point(&state);
         let speeds = [&self.state, &state].map(|state| self.speed(state));
         let controls = self.is_active() && !self.speed_loop.torque_mode;
-        let limited = controls.then(|| Overload::limited(state.tau, point.limits, state.speed_ref - speeds[1]));
+        self.backward.update(step.h, controls, state.speed_ref, speeds[1]);
+        let limited = controls && Overload::limited(state.tau, point.limits, state.speed_ref - speeds[1]);
         self.load.update(step.h, limited, state.speed_ref, speeds);
         self.state = state;
         self.last = self.instant(&state, &point);
@@ -185,6 +187,7 @@ impl Warns for MappedDrive {
             });
         }
         self.load.warn([speed, self.state.speed_ref], || self.point(&self.state).limits, log);
+        self.backward.warn(self.state.speed_ref, speed, log);
         if self.clipped_for >= 1.0 {
             log.warn("tau_ref", || clipped(self.inputs.tau_ref, self.point(&self.state).limits));
         }

@@ -1,7 +1,8 @@
 //! The drive: its parameters, its state and its outputs.
 
 use super::map::Map;
-use crate::pmsm_drive::Happened;
+use crate::backward::Backward;
+use crate::happened::Happened;
 use drive_control::overload::Overload;
 use drive_control::speed::SpeedLoop;
 use drive_plant::power::Energy;
@@ -33,6 +34,8 @@ pub struct MappedDrive {
     pub(super) clipped_for: f64,
     /// Watch for a load above the torque of the drive.
     pub(super) load: Overload,
+    /// The shaft against the direction of its reference.
+    pub(super) backward: Backward,
 }
 
 /// Inputs.
@@ -94,6 +97,7 @@ impl Default for MappedDrive {
             off_voltage: Happened::default(),
             clipped_for: 0.0,
             load: Overload::default(),
+            backward: Backward::default(),
         }
     }
 }

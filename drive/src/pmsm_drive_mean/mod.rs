@@ -32,11 +32,13 @@ mod show;
 mod supply;
 
 use crate::apart;
+use crate::backward::Backward;
 use crate::beginning::{BEGINNING, BeginningParameters};
 use crate::dc_link::{LINK, LinkEnergy, LinkParameters};
 use crate::derating::DERATING;
+use crate::happened::Happened;
 use crate::idle;
-use crate::pmsm_drive::{DriveInputs, DriveOutputs, Happened, INPUTS, OUTPUTS, in_part};
+use crate::pmsm_drive::{DriveInputs, DriveOutputs, INPUTS, OUTPUTS, in_part};
 use crate::rules::same_pole_pairs;
 use crate::steady::{At, Condition, Diodes, Point, Steady, check_saturation};
 use crate::torque::{TORQUE, TorqueAt, TorqueParameters};
@@ -107,6 +109,8 @@ pub struct PmsmDriveMean {
     clipped_for: f64,
     /// Watch for a load above the torque of the drive.
     overload: Overload,
+    /// The shaft against the direction of its reference.
+    backward: Backward,
     /// Always `None`: a drive in steady state does not commission itself.
     commissioning: Held,
 }
@@ -137,6 +141,7 @@ impl Default for PmsmDriveMean {
             impossible: Happened::default(),
             clipped_for: 0.0,
             overload: Overload::default(),
+            backward: Backward::default(),
             commissioning: None,
         }
     }
@@ -264,7 +269,7 @@ impl PmsmDriveMean {
         let error = state.speed_ref - speeds[1];
         let speed_mode = self.gates() && !self.torque_mode();
         let mut overload = self.overload;
-        let limited = speed_mode.then(|| Overload::limited(state.tau, self.narrowed(state, point), error));
+        let limited = speed_mode && Overload::limited(state.tau, self.narrowed(state, point), error);
         overload.update(h, limited, state.speed_ref, speeds);
         overload
     }
@@ -325,7 +330,7 @@ impl Model for PmsmDriveMean {
 
     const ICON: Option<&'static str> = Some(include_str!("../../icons/pmsm_drive.svg"));
 
-    const STATE_VERSION: u16 = 11;
+    const STATE_VERSION: u16 = 12;
 
     const CONTINUOUS: bool = true;
 
@@ -395,7 +400,7 @@ impl Model for PmsmDriveMean {
         (self.energy, self.network, self.moved) = (Energy::default(), self.drive.start_temperatures(), false);
         (self.clipped_for, self.impossible, self.link_energy) = (0.0, Happened::default(), LinkEnergy::default());
         (self.known, self.point, self.trip) = (false, Point::default(), Trip::default());
-        (self.diodes, self.overload) = (Diodes::default(), Overload::default());
+        (self.diodes, self.overload, self.backward) = (Diodes::default(), Overload::default(), Backward::default());
         (self.follows, self.gates_on) = (self.inputs.modes.follows(), self.gates());
         self.begin_steadily();
         let temperatures = self.temperatures();
@@ -431,6 +436,8 @@ impl Model for PmsmDriveMean {
         self.energy.add(&Energy { r#in: total.r#in * step.h, mech: total.mech * step.h, loss: total.loss * step.h });
         self.link_energy.add(&self.link_powers(powers.p_in).times(step.h));
         self.overload = self.watched(step.h, &state, &point);
+        let controls = self.gates() && !self.torque_mode();
+        self.backward.update(step.h, controls, state.speed_ref, self.speed(&state));
         (self.state, self.point, self.moved) = (state, point, true);
         (self.asked, self.known) = (self.question(&state, temperatures), true);
         self.impossible = self.impossible.followed_by(self.is_impossible());
@@ -498,6 +505,7 @@ impl Warns for PmsmDriveMean {
         }
         let speeds = [self.speed(&self.state), self.state.speed_ref];
         self.overload.warn(speeds, || self.limits(&self.state, &self.point), log);
+        self.backward.warn(self.state.speed_ref, self.speed(&self.state), log);
         if self.clipped_for >= 1.0 {
             log.warn("tau_ref", || clipped(self.inputs.tau_ref, self.limits(&self.state, &self.point)));
         }
