@@ -2,10 +2,12 @@
 //! controller on its own, a drive knows both.
 //!
 //! Temperature, saturation and tolerances change resistance, inductances and flux linkage by less than a factor of five. The inertia that the
-//! controller counts may lack a load. With `plant.flux_map`, the map describes the machine; a commissioning measures it.
+//! controller counts may lack a load. With `plant.flux_map`, the map describes the machine; a commissioning measures it. And devices of the
+//! inverter that would drop half of the link's voltage at the current limit: a threshold in mV, a resistance in mOhm.
 
 use drive_control::commission::CommissionMode;
 use drive_control::tables::ControllerParameters;
+use drive_plant::losses::conduction::Devices;
 use drive_plant::tables::PlantParameters;
 use fmu_core::digits;
 
@@ -40,9 +42,49 @@ pub(crate) fn message(plant: &PlantParameters, controller: &ControllerParameters
     ))
 }
 
+/// Largest plausible voltage of a device at the current limit, as a share of the link's.
+const DROP: f64 = 0.5;
+
+/// The message about devices that leave too little of `u_dc` (V) at the current limit `i` (A).
+pub(crate) fn drops(devices: &Devices, i: f64, u_dc: f64) -> Option<String> {
+    let &Devices { u_transistor, r_transistor, u_diode, r_diode, .. } = devices;
+    let values = [
+        ("u_transistor", "V", u_transistor, u_transistor),
+        ("r_transistor", "Ohm", r_transistor, r_transistor * i),
+        ("u_diode", "V", u_diode, u_diode),
+        ("r_diode", "Ohm", r_diode, r_diode * i),
+    ];
+    let (name, unit, x, drop) = values.into_iter().find(|(_, _, _, drop)| u_dc > 0.0 && *drop > DROP * u_dc)?;
+    let drop = digits::text(drop, 3, 1e6);
+    Some(format!(
+        "plant.inverter.{name} = {x} {unit} drops {drop} V at controller.limit.i = {i} A, of u_dc = {u_dc} V: no inverter does; check that it is in {unit}"
+    ))
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn devices_of_another_unit_are_reported() {
+        let said = |set: fn(&mut Devices)| {
+            let mut devices = Devices {
+                u_transistor: 0.8,
+                r_transistor: 2.2e-3,
+                u_diode: 0.9,
+                r_diode: 1.6e-3,
+                ..Devices::default()
+            };
+            set(&mut devices);
+            drops(&devices, 240.0, 400.0).unwrap_or_default()
+        };
+        assert_eq!(said(|_| ()), "");
+        assert_eq!(said(|d| d.r_diode = 0.5), "");
+        let diode = "plant.inverter.r_diode = 1.6 Ohm drops 384 V at controller.limit.i = 240 A, of u_dc = 400 V";
+        assert!(said(|d| d.r_diode = 1.6).starts_with(diode));
+        assert!(said(|d| d.u_transistor = 800.0).contains("u_transistor = 800 V drops 800 V"));
+        assert_eq!(drops(&Devices { r_diode: 1.6, ..Devices::default() }, 240.0, 0.0), None);
+    }
 
     #[test]
     fn data_of_another_unit_are_reported_and_tolerances_are_not() {

@@ -419,9 +419,13 @@ impl Warns for PmsmDrive {
             log.warn("initial.steady", || self.unsettled_message());
         }
         if self.pair.now.seconds() <= 1.0 {
-            let apart = apart::message(&plant.parameters, &self.pair.controller.model.parameters);
-            let messages =
-                [("T_pwm", self.pair.skips_commands()), ("i_zero", self.pair.wrong_zone()), ("apart", apart)];
+            let controller = &self.pair.controller.model.parameters;
+            let messages = [
+                ("T_pwm", self.pair.skips_commands()),
+                ("i_zero", self.pair.wrong_zone()),
+                ("apart", apart::message(&plant.parameters, controller)),
+                ("devices", apart::drops(&plant.parameters.inverter.devices, controller.limit.i, u_dc)),
+            ];
             for (key, message) in messages {
                 if let Some(message) = message {
                     log.warn(key, || message.clone());

@@ -511,8 +511,11 @@ impl Warns for PmsmDriveMean {
         }
         self.drive.derating.warn(log);
         let plant = &self.drive.plant;
-        if let Some(message) = apart::message(plant, &self.drive.controller) {
-            log.warn("apart", || message.clone());
+        let drops = apart::drops(&plant.inverter.devices, self.drive.controller.limit.i, self.inputs.u_dc);
+        for (key, message) in [("apart", apart::message(plant, &self.drive.controller)), ("devices", drops)] {
+            if let Some(message) = message {
+                log.warn(key, || message.clone());
+            }
         }
         plant.thermal.warn(&self.inputs.thermal, log);
         plant.inverter.warn(log);
