@@ -30,7 +30,8 @@ impl Backward {
         if !controls || speed_ref == 0.0 || turns <= 0.2 * speed_ref.abs() + 10.0 {
             *self = Self::default();
         } else if turns > self.farthest {
-            (self.farthest, self.time) = (turns, self.time + h);
+            let grew = if self.farthest > 0.0 { h } else { 0.0 };
+            (self.farthest, self.time) = (turns, self.time + grew);
         }
         self.found = self.found.followed_by(self.time > LONG - 0.5 * h);
     }
