@@ -2,8 +2,9 @@
 //! controller on its own, a drive knows both.
 //!
 //! Temperature, saturation and tolerances change resistance, inductances and flux linkage by less than a factor of five. The inertia that the
-//! controller counts may lack a load. With `plant.flux_map`, the map describes the machine; a commissioning measures it. And devices of the
-//! inverter that would drop half of the link's voltage at the current limit: a threshold in mV, a resistance in mOhm.
+//! controller counts may lack a load. With `plant.flux_map`, the map describes the machine; a commissioning measures it.
+//! [`drops`] names devices of the inverter that would drop half of the link's voltage at the current limit: a threshold in mV, a
+//! resistance in mOhm.
 
 use drive_control::commission::CommissionMode;
 use drive_control::tables::ControllerParameters;

@@ -16,7 +16,7 @@ const LONG: f64 = 1.0;
 /// What has been seen.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub(crate) struct Backward {
-    /// Greatest speed against the direction of the reference.
+    /// Maximum speed against the direction of the reference.
     farthest: f64,
     /// Time in s in which it has grown.
     time: f64,

@@ -97,7 +97,7 @@ const FADE: f64 = 0.1;
 /// Bandwidth of the smoothed slip as a share of the tracker's.
 const SMOOTH: f64 = 0.03;
 
-/// Greatest slip as a share of the speed and of `w_hold`.
+/// Maximum slip as a share of the speed and of `w_hold`.
 const MOST: f64 = 0.25;
 
 impl Direction {
