@@ -1,18 +1,13 @@
 //! Limits of the DC-link current: kept within 5 % in steady state with exact parameters, without hunting, in Co-Simulation
 //! and in Model Exchange.
-#![allow(missing_docs, non_snake_case)]
 
-mod importer;
-#[path = "../control/tests/machines/mod.rs"]
-mod machines;
-
+use crate::importer::Importer;
+use crate::machines::{Machine, RPM, a, b, c};
 use drive::PmsmDrive;
 use drive::control::battery::DcLimits;
 use drive::pmsm_drive::DriveOutputs;
 use fmu_core::log::Warnings;
 use fmu_core::{Model, Step};
-use importer::Importer;
-use machines::{Machine, RPM, a, b, c};
 
 const T_S: f64 = 1e-4;
 

@@ -1,6 +1,6 @@
 //! Self-commissioning inside the controller: start and end, the drive with the bits of the pair, and states that are saved and
 //! restored during the sequence.
-#![allow(missing_docs, non_snake_case, clippy::float_cmp)]
+#![allow(clippy::float_cmp)]
 
 use drive::control::commission::{CommissionFault as Fault, CommissionState as State, Results};
 use drive::control::commissioning::{CommissionMode, CommissionParameters};

@@ -1,5 +1,4 @@
 //! A diverging coupling: the work of a step stays bounded, and the error names the remedy.
-#![allow(missing_docs)]
 
 use drive::{PmsmDrive, PmsmPlant};
 use fmu_core::log::Warnings;

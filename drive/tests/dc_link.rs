@@ -1,18 +1,14 @@
 //! The DC link inside `PmsmDrive`, in Co-Simulation and in Model Exchange: steady state, precharge, brake chopper, energies.
-#![allow(missing_docs, non_snake_case, clippy::float_cmp)]
+#![allow(clippy::float_cmp)]
 
-mod importer;
-#[path = "../control/tests/machines/mod.rs"]
-mod machines;
-
+use crate::importer::Importer;
+use crate::machines::{Machine, RPM, b, c};
 use drive::PmsmDrive;
 use drive::dc_link::{DcSource, LinkParameters};
 use drive::plant::machine::{flux, magnetic_energy};
 use drive::pmsm_drive::DriveOutputs;
 use drive_base::frame::Dq;
 use fmu_core::{Block, Capabilities, ContinuousTime, Description, Differentiable, Events, Exported, Model, Step};
-use importer::Importer;
-use machines::{Machine, RPM, b, c};
 
 const T_S: f64 = 1e-4;
 

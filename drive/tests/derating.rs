@@ -1,18 +1,13 @@
 //! The derating of a hot winding, in `PmsmDrive` and in `PmsmDriveMean`, in torque and in speed control.
-#![allow(missing_docs, non_snake_case)]
 
-#[path = "../plant/tests/lossy/mod.rs"]
-mod lossy;
-#[path = "../control/tests/machines/mod.rs"]
-mod machines;
-
+use crate::machines::RPM;
+use crate::{lossy, machines};
 use drive::derating::Derating;
 use drive::plant::thermal::ThermalMode;
 use drive::pmsm_drive::{DriveInputs, DriveOutputs};
 use drive::{PmsmDrive, PmsmDriveMean};
 use drive_control::tables::ControllerParameters;
 use fmu_core::{Block, Elapsed, Model, Step};
-use machines::RPM;
 
 fn derating() -> Derating {
     Derating { used: true, T_winding: 400.0, T_winding_max: 440.0, ..Derating::default() }

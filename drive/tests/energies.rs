@@ -1,10 +1,8 @@
 //! Torque of an imposed shaft and energies: the work that a drive train integrates equals the counted energy, in
 //! Co-Simulation and in Model Exchange.
-#![allow(missing_docs, clippy::float_cmp)]
-#![allow(non_snake_case, reason = "the papers' symbols")]
+#![allow(clippy::float_cmp)]
 
-mod importer;
-
+use crate::importer::Importer;
 use drive::control::current::CurrentLoop;
 use drive::control::limits::Limits;
 use drive::estimator::Kind as Estimator;
@@ -15,7 +13,6 @@ use drive::plant::tables::PlantParameters;
 use drive::pmsm_drive::Means;
 use drive::{PmsmDrive, PmsmPlant};
 use fmu_core::{Block, CompletedSteps, ContinuousTime, Elapsed, Events, Step};
-use importer::Importer;
 
 const RPM: f64 = std::f64::consts::PI / 30.0;
 

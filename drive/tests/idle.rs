@@ -1,5 +1,4 @@
 //! A value without effect is reported by name, once, and only such values are reported.
-#![allow(missing_docs, non_snake_case)]
 
 use drive::control::start::StartMode;
 use drive::estimator::Kind;

@@ -1,5 +1,4 @@
 //! `voltage_limited` and `current_limited` are true exactly when the drive is at a limit.
-#![allow(missing_docs, non_snake_case)]
 
 use drive::{Pair, PmsmDrive};
 use fmu_core::log::Warnings;

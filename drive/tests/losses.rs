@@ -1,6 +1,5 @@
 //! The power balance with all losses on, at random instants and over 20 ms; Model Exchange against Co-Simulation; dependencies
 //! of the currents.
-#![allow(missing_docs, non_snake_case)]
 
 use drive::frame::{AlphaBeta, Phases};
 use drive::motor::Motor;

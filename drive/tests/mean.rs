@@ -1,12 +1,7 @@
 //! `PmsmDriveMean` beside `PmsmDrive`: a driving cycle, the lag of the torque, the speed loop, temperatures, both interfaces.
-#![allow(missing_docs, non_snake_case)]
 
-#[path = "../plant/tests/lossy/mod.rs"]
-mod lossy;
-#[path = "../control/tests/machines/mod.rs"]
-mod machines;
-mod vehicle;
-
+use crate::vehicle::{ENERGY, KWH, LOSSES, Vehicle};
+use crate::{lossy, machines};
 use drive::dc_link::{Chopper, DcSource};
 use drive::derating::Derating;
 use drive::plant::flux_map;
@@ -21,7 +16,6 @@ use drive_control::modes::SpeedRange;
 use drive_control::tables::ControllerParameters;
 use fmu_core::log::Warnings;
 use fmu_core::{Block, Causality, ContinuousTime, Description, Elapsed, Meta, Model, Slot, Step, Warns};
-use vehicle::{ENERGY, KWH, LOSSES, Vehicle};
 
 /// A drive with the same inputs and the same outputs.
 trait Drive: Model + Send {

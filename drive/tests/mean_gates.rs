@@ -1,12 +1,8 @@
 //! `PmsmDriveMean` beside `PmsmDrive` while the gates do not switch: diodes that rectify, with saliency and losses, on a stiff and on
 //! a soft link; a current that goes on below the speed at which it begins; active short circuit, also by a trip; energies.
-#![allow(missing_docs, non_snake_case)]
 
-#[path = "../plant/tests/lossy/mod.rs"]
-mod lossy;
-#[path = "../control/tests/machines/mod.rs"]
-mod machines;
-
+use crate::machines::RPM;
+use crate::{lossy, machines};
 use drive::dc_link::{DcSource, LinkParameters};
 use drive::plant::tables::PlantParameters;
 use drive::pmsm_drive::{DriveInputs, DriveOutputs};
@@ -15,7 +11,6 @@ use drive_base::motor::Motor;
 use drive_control::tables::ControllerParameters;
 use drive_control::trip::Cause;
 use fmu_core::{Block, ContinuousTime, Elapsed, Events, Model, Step};
-use machines::RPM;
 
 /// A drive in torque mode with a sensor on an imposed shaft.
 #[derive(Clone)]

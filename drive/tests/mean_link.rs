@@ -1,20 +1,14 @@
 //! `PmsmDriveMean` beside `PmsmDrive` on a DC link: sag and chopper, limits of the battery's current, trips, and energies.
-#![allow(missing_docs, non_snake_case)]
 
-#[path = "../plant/tests/lossy/mod.rs"]
-mod lossy;
-#[path = "../control/tests/machines/mod.rs"]
-mod machines;
-mod vehicle;
-
+use crate::machines::RPM;
+use crate::vehicle::Vehicle;
+use crate::{lossy, machines};
 use drive::dc_link::{DcSource, LinkParameters};
 use drive::pmsm_drive::{DriveInputs, DriveOutputs};
 use drive::{PmsmDrive, PmsmDriveMean};
 use drive_control::tables::ControllerParameters;
 use drive_control::trip::Cause;
 use fmu_core::{Block, ContinuousTime, Elapsed, Events, Model, Step};
-use machines::RPM;
-use vehicle::Vehicle;
 
 /// Settings of machine c with all losses, in torque mode on an imposed shaft and a link of 400 V.
 type Set<'a> = &'a dyn Fn(&mut ControllerParameters, &mut LinkParameters);

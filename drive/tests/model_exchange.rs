@@ -1,7 +1,6 @@
 //! Model Exchange of the native models: derivatives and events, integrated in steps of 1 us between events, against
 //! Co-Simulation.
-#![allow(missing_docs, clippy::float_cmp)]
-#![allow(non_snake_case, reason = "the papers' symbols")]
+#![allow(clippy::float_cmp)]
 
 use drive::control::signals::ControllerInputs;
 use drive::frame::{AlphaBeta, Dq, Phases};

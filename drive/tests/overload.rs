@@ -1,6 +1,5 @@
 //! A load that the drive cannot hold is reported in speed control by every drive; a start, a reversal and a load within its torque are
 //! not.
-#![allow(missing_docs)]
 
 use drive::control::estimator::Kind;
 use drive::{MappedDrive, PmsmDrive, PmsmDriveMean};

@@ -1,10 +1,7 @@
 //! Overmodulation in the closed loop: the torque that its voltage allows, in the running drive and by algebra, and the plant's own
 //! modulator.
-#![allow(missing_docs, non_snake_case)]
 
-#[path = "../control/tests/machines/mod.rs"]
-mod machines;
-
+use crate::machines::{Machine, RPM, a, b, c};
 use drive::Pair;
 use drive::steady::{Condition, Steady};
 use drive_base::frame::{AlphaBeta, Phases};
@@ -12,7 +9,6 @@ use drive_base::overmodulation::ModulationMode;
 use drive_plant::PmsmPlant;
 use drive_plant::pwm::InverterMode;
 use fmu_core::{Block, Elapsed, Step};
-use machines::{Machine, RPM, a, b, c};
 use std::f64::consts::{FRAC_2_PI, TAU};
 
 const T_S: f64 = 1e-4;

@@ -1,5 +1,4 @@
 //! Each parameter has exactly one variable, in the table of its part, so every refusal can name the parameter.
-#![allow(missing_docs)]
 
 use drive::PmsmDrive;
 use drive::control::tables as control;

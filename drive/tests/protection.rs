@@ -1,17 +1,13 @@
 //! Protection of the drive, in Co-Simulation and in Model Exchange: over-current and over-voltage trips, and the loss of a
 //! sensor during the run.
-#![allow(missing_docs, non_snake_case)]
 
-#[path = "../control/tests/machines/mod.rs"]
-mod machines;
-
+use crate::machines::{Machine, RPM, b, c};
 use drive::PmsmDrive;
 use drive::control::trip::Cause;
 use drive::estimator::Kind;
 use drive::plant::inverter::Gates;
 use fmu_core::log::Warnings;
 use fmu_core::{Block, ContinuousTime, Elapsed, Model, Step, Warns, integrate};
-use machines::{Machine, RPM, b, c};
 
 const T_S: f64 = 1e-4;
 

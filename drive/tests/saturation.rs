@@ -1,5 +1,4 @@
 //! Flux linkages beyond the saturation polynomial or the flux map: every model warns or returns an error.
-#![allow(missing_docs)]
 
 use drive::plant::flux_map;
 use drive::plant::tables::PlantParameters;

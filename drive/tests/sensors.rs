@@ -1,11 +1,8 @@
 //! Errors of the current sensors against closed forms, for a machine without saliency at a speed well within the bandwidth of
 //! the current loop: an offset d of phase a gives a torque ripple n_p psi_M d at the electrical speed w, a gain error g of one
 //! phase a ripple g tau / 3 at 2 w and the mean -g tau / 3.
-#![allow(missing_docs, non_snake_case)]
 
-#[path = "../control/tests/machines/mod.rs"]
-mod machines;
-
+use crate::machines::b;
 use drive::PmsmDrive;
 use drive::control::position::PositionSensor;
 use drive::control::sensor::{MeasuredPhases, Sensor};
@@ -14,7 +11,6 @@ use drive::control::tables::ControllerParameters;
 use drive::estimator::Kind;
 use drive::motor::Motor;
 use fmu_core::{Block, ContinuousTime, Elapsed, Model, Step, integrate};
-use machines::b;
 use std::f64::consts::{PI, TAU};
 
 const T_S: f64 = 1e-4;

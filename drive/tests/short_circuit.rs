@@ -3,17 +3,13 @@
 //!
 //! i_d = -w^2 L_q psi_M / (R^2 + w^2 L_d L_q), i_q = -w R psi_M / (R^2 + w^2 L_d L_q), and from a flux linkage psi_0 the first
 //! swing reaches at most -(psi_M + |psi_0|) / L_d.
-#![allow(missing_docs, non_snake_case)]
 
-#[path = "../control/tests/machines/mod.rs"]
-mod machines;
-
+use crate::machines::{Machine, RPM, a, b, c};
 use drive::plant::machine::{flux, magnetic_energy};
 use drive::plant::signals::PlantOutputs;
 use drive::{PmsmDrive, PmsmPlant};
 use drive_base::frame::Dq;
 use fmu_core::{Block, CompletedSteps, ContinuousTime, Elapsed, Model, Step, integrate};
-use machines::{Machine, RPM, a, b, c};
 
 const T_S: f64 = 1e-4;
 

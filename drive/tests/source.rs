@@ -1,17 +1,12 @@
 //! The sources of the DC link in `PmsmDrive`, in Co-Simulation and in Model Exchange: rectifiers, a battery with limits, brown-out.
-#![allow(missing_docs, non_snake_case)]
 
-mod importer;
-#[path = "../control/tests/machines/mod.rs"]
-mod machines;
-
+use crate::importer::Importer;
+use crate::machines::{Machine, RPM, b, c};
 use drive::PmsmDrive;
 use drive::dc_link::DcSource;
 use drive::pmsm_drive::DriveOutputs;
 use drive_control::trip::Cause;
 use fmu_core::{Block, Model, Step};
-use importer::Importer;
-use machines::{Machine, RPM, b, c};
 use std::f64::consts::TAU;
 
 const T_S: f64 = 1e-4;

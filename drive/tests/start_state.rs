@@ -1,5 +1,4 @@
 //! The output `start_state` with every estimator and every start: during a run, after a trip, and when the drive starts anew.
-#![allow(missing_docs, non_snake_case)]
 
 use StartState::{Aligning, Idle, Ramping, Running};
 use drive::Pair;

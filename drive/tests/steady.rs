@@ -1,13 +1,8 @@
 //! The algebra of the steady state against an independent calculation and against a settled drive.
-#![allow(missing_docs, non_snake_case)]
 
-#[path = "../plant/tests/lossy/mod.rs"]
-mod lossy;
-#[path = "../control/tests/machines/mod.rs"]
-mod machines;
-#[path = "../control/tests/random_machines/mod.rs"]
-mod random_machines;
-
+use crate::lossy::{Drive, Figures, SILICON_CARBIDE};
+use crate::machines::{Machine, RPM, envelope_figures, inside_figures};
+use crate::{lossy, machines, random_machines};
 use drive::PmsmDrive;
 use drive::control::reference::max_torque_per_ampere;
 use drive::frame::Dq;
@@ -17,8 +12,6 @@ use drive::plant::tables::PlantParameters;
 use drive::plant::thermal::Temperatures;
 use drive::steady::{At, Condition, Diodes, Point, Region, Steady};
 use fmu_core::{Block, Elapsed, Model, Step};
-use lossy::{Drive, Figures, SILICON_CARBIDE};
-use machines::{Machine, RPM, envelope_figures, inside_figures};
 
 /// A machine without iron, inverter and friction losses.
 fn bare(machine: &Machine) -> Steady {

@@ -1,5 +1,4 @@
 //! The switched inverter against closed forms, against the average inverter, and against an independent switched plant.
-#![allow(missing_docs, non_snake_case)]
 
 use drive::control::tables::ControllerParameters;
 use drive::frame::{AlphaBeta, Phases, SQRT_3};

@@ -1,5 +1,4 @@
 //! Tangents of plant and drive by dual numbers against central differences, at random points.
-#![allow(missing_docs)]
 
 use drive::motor::Motor;
 use drive::plant::pwm::{InverterMode, OpenPhase};

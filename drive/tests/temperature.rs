@@ -4,7 +4,6 @@
 //! The figures are an independent calculation for three machines: a, the 2.2 kW machine of Kim & Sul; b, the reference
 //! motor; c, a traction machine (gym-electric-motor's default, which cites DOI 10.1109/TPEL.2020.3006779). The thermal
 //! parameters are assumed.
-#![allow(missing_docs, non_snake_case)]
 
 use drive::control::current::CurrentLoop;
 use drive::control::envelope::{Envelope, Limit, WarmStart};

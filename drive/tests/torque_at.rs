@@ -1,11 +1,7 @@
 //! `torque.at` = Shaft: the drive gives the torque that is asked for, and its limits are torques that it gives.
-#![allow(missing_docs, non_snake_case)]
 
-#[path = "../plant/tests/lossy/mod.rs"]
-mod lossy;
-#[path = "../control/tests/machines/mod.rs"]
-mod machines;
-
+use crate::machines::RPM;
+use crate::{lossy, machines};
 use drive::plant::tables::PlantParameters;
 use drive::pmsm_drive::{DriveInputs, DriveOutputs};
 use drive::torque::TorqueAt;
@@ -13,7 +9,6 @@ use drive::{PmsmDrive, PmsmDriveMean};
 use drive_control::tables::ControllerParameters;
 use fmu_core::log::Warnings;
 use fmu_core::{Block, Elapsed, Model, Step, Warns};
-use machines::RPM;
 
 /// Machines a, b and c with all losses and a hot magnet, in torque mode on an imposed shaft; the speed in rpm up to which the
 /// test goes, and a torque in N.m.

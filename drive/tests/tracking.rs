@@ -1,5 +1,4 @@
 //! The bounds of the tracker's bandwidth in field weakening ([`tracking`](drive::control::tracking)) in the running drive.
-#![allow(missing_docs, non_snake_case)]
 
 use drive::control::envelope::{Envelope, WarmStart};
 use drive::control::reference::max_torque_per_ampere;

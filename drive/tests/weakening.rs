@@ -1,11 +1,8 @@
 //! Field weakening in the closed loop with a sensor; [`envelope`](drive::control::envelope) has its algebra.
 //!
 //! The figures come from the algebra's tests, for the same machines, with k_u = 0.95 unless noted.
-#![allow(missing_docs, non_snake_case)]
 
-#[path = "../control/tests/machines/mod.rs"]
-mod machines;
-
+use crate::machines::{Machine, RPM, a, b, c, currents};
 use drive::Pair;
 use drive::control::envelope::{Envelope, WarmStart};
 use drive::control::tables::ControllerParameters;
@@ -13,7 +10,6 @@ use drive::estimator::Kind;
 use drive::motor::Motor;
 use fmu_core::Warns;
 use fmu_core::log::Warnings;
-use machines::{Machine, RPM, a, b, c, currents};
 use std::f64::consts::TAU;
 
 const T_S: f64 = 1e-4;

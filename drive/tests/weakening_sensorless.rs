@@ -1,5 +1,4 @@
 //! Field weakening without a sensor: the drive reaches its speed and stays there, with every estimator.
-#![allow(missing_docs, non_snake_case)]
 
 use drive::Pair;
 use drive::control::start::StartMode;

@@ -1,6 +1,7 @@
 //! The closed loop run natively: the reference for every figure and for the packed FMUs.
 #![allow(dead_code, missing_docs, unreachable_pub, clippy::missing_panics_doc)]
 
+pub mod archives;
 pub mod estimators;
 pub mod importers;
 pub mod packed;
@@ -10,11 +11,12 @@ pub mod python;
 pub mod shows;
 pub mod words;
 
+pub use archives::archives;
 use drive::Pair;
 use drive_study::reproduce::experiment::{ClosedLoop, Experiment, Point, RPM, Record, at, samples_apart};
 use drive_study::runner::run_in_steps;
 use fmu_core::{Block, Model, Slot};
-use std::path::{Path, PathBuf};
+use std::path::Path;
 
 /// Sets the variable `name` of a block; integers and Booleans are converted from a number.
 pub fn set<M: Model>(block: &mut Block<M>, name: &str, value: f64) {
@@ -82,19 +84,6 @@ impl ClosedLoop for Native {
         });
         Ok(record)
     }
-}
-
-/// Folder with the packed FMUs of both standards, `fmi2/` and `fmi3/`: `FMU_TEST_ARCHIVES`, set by `.ci/run`, or built once for
-/// each test program.
-pub fn archives() -> &'static Path {
-    static FOLDER: std::sync::OnceLock<PathBuf> = std::sync::OnceLock::new();
-    FOLDER.get_or_init(|| {
-        if let Some(folder) = std::env::var_os("FMU_TEST_ARCHIVES") {
-            return folder.into();
-        }
-        let files = fmu::commands::build::models(&fmu::commands::build::Models::default()).expect("FMUs that build");
-        files[0].parent().and_then(Path::parent).expect("DIR/fmi2/NAME.fmu").to_owned()
-    })
 }
 
 /// Copies an archive entry by entry, each with new bytes or omitted.

@@ -1,10 +1,8 @@
 //! Every option of the controller with every estimator has the described effect, or is refused by name.
-#![allow(missing_docs, non_snake_case)]
 
 mod cases;
-#[path = "../tuned/mod.rs"]
-mod tuned;
 
+use crate::tuned::{RATED, T_S, drive, turning};
 use cases::CASES;
 use drive::Pair;
 use drive::control::tables::PARAMETERS;
@@ -12,7 +10,6 @@ use drive::estimator::{Class, Kind};
 use drive::frame::AlphaBeta;
 use drive::math::wrap;
 use fmu_core::Kind as Type;
-use tuned::{RATED, T_S, drive, turning};
 
 /// Speed in rad/s at which every method works.
 const SLOW: f64 = 0.1 * RATED;

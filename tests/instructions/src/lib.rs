@@ -3,17 +3,22 @@
 //!
 //! A separate process runs a subject `n` times, another one 2 `n` times: their difference excludes the start of the process and the first
 //! call. The native drive is compiled with the optimized test profile; the FMUs are the packed ones.
+//!
+//! A package of its own: the other tests of `tests/` compile without optimization.
 #![allow(missing_docs)]
-#![cfg(all(target_os = "linux", target_arch = "x86_64"))]
+#![cfg(all(test, target_os = "linux", target_arch = "x86_64"))]
 
-#[path = "../benches/candidates/mod.rs"]
+#[allow(unreachable_pub, reason = "reachable in the other tests")]
+#[path = "../../common/archives.rs"]
+mod archives;
 #[allow(dead_code, reason = "the benchmarks need more")]
+#[path = "../../../benches/candidates/mod.rs"]
 mod candidates;
-mod common;
-#[path = "../fmu-sweep/examples/sweep.rs"]
 #[allow(dead_code, reason = "its main")]
+#[path = "../../../fmu-sweep/examples/sweep.rs"]
 mod sweep;
 
+use archives::archives;
 use candidates::{PERIODS, POINTS, native, references, start, through_c, whole_drive};
 use fmu_import::{Fmu, Kind};
 use std::hint::black_box;
@@ -33,12 +38,12 @@ const SUBJECTS: [(&str, u32, u32); 7] = [
 ];
 
 fn file(name: &str) -> PathBuf {
-    common::archives().join("fmi3").join(name).with_extension("fmu")
+    archives().join("fmi3").join(name).with_extension("fmu")
 }
 
 /// Runs a subject `n` times.
 fn run(subject: &str, n: u32) {
-    let (point, folder) = (POINTS[0], common::archives().join("fmi3"));
+    let (point, folder) = (POINTS[0], archives().join("fmi3"));
     let turns = |mut candidate: candidates::Candidate| (0..n).for_each(|_| (candidate.turn)());
     match subject {
         // Plant and controller.
@@ -94,7 +99,7 @@ fn executed(subject: &str, n: u32) -> f64 {
     valgrind.env("INSTRUCTIONS_OF", subject).env("INSTRUCTIONS_N", n.to_string());
     // The C library of any processor copies alike.
     valgrind.env("GLIBC_TUNABLES", "glibc.cpu.hwcaps=-AVX2,-AVX2_Usable,-AVX512F,-AVX512VL,-ERMS,-FSRM");
-    valgrind.env("FMU_TEST_ARCHIVES", common::archives());
+    valgrind.env("FMU_TEST_ARCHIVES", archives());
     let output = valgrind.output().unwrap();
     let said = String::from_utf8_lossy(&output.stderr);
     assert!(output.status.success(), "{subject}: {said}");
@@ -108,7 +113,7 @@ fn check(subjects: &[(&str, u32, u32)]) {
         println!("skipped: there is no valgrind (apt install valgrind)");
         return;
     }
-    let file = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/golden/instructions.csv");
+    let file = Path::new(env!("CARGO_MANIFEST_DIR")).join("../golden/instructions.csv");
     let budgets = || std::fs::read_to_string(&file).unwrap();
     let text = budgets();
     let (mut counts, mut above) = (Vec::new(), Vec::new());
@@ -131,7 +136,7 @@ fn check(subjects: &[(&str, u32, u32)]) {
     }
     assert!(
         above.is_empty(),
-        "{above:#?}\nIf you meant to, UPDATE_GOLDEN=1 cargo test --test instructions writes the budgets"
+        "{above:#?}\nIf you meant to, UPDATE_GOLDEN=1 cargo test -p instructions writes the budgets"
     );
 }
 
