@@ -193,7 +193,7 @@ impl Fmu {
     ) -> Result<Instance, Error> {
         let logging = logging.into();
         let mut instance = self.made(kind, name, logging == Logging::All, visible)?;
-        if logging == Logging::Warnings && instance.log_warnings().is_err() {
+        if logging == Logging::Warnings && instance.log_warnings(true).is_err() {
             // After an error, an instance can only be freed; one without warnings is better than none.
             drop(instance);
             return self.made(kind, name, false, visible);

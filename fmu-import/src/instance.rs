@@ -209,12 +209,15 @@ impl Instance {
         self.call(Call::Evaluation, |s| s.set_debug_logging(on, None))
     }
 
-    /// Requests warnings from an FMU that has a category for them.
-    pub(crate) fn log_warnings(&mut self) -> Result<(), Error> {
+    /// Requests warnings from an FMU that has a category for them, or no longer.
+    ///
+    /// # Errors
+    /// The FMU refuses; the instance can only be freed.
+    pub fn log_warnings(&mut self, on: bool) -> Result<(), Error> {
         const WARNING: &CStr = c"logStatusWarning";
         let listed =
             self.description.log_categories.iter().any(|category| category.name.as_bytes() == WARNING.to_bytes());
-        if listed { self.call(Call::Evaluation, |s| s.set_debug_logging(true, Some(WARNING))) } else { Ok(()) }
+        if listed { self.call(Call::Evaluation, |s| s.set_debug_logging(on, Some(WARNING))) } else { Ok(()) }
     }
 
     /// Sets the start time of the simulation and, if it is known, the stop time.

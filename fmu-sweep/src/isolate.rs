@@ -71,8 +71,13 @@ impl<'a> Process<'a> {
         Ok(None)
     }
 
-    /// The lines of rows.
-    pub(crate) fn run(&mut self, mut rows: Range<u64>, lines: &mut String) -> Result<(), Error> {
+    /// The lines of rows, and the rows in which the FMUs warned.
+    pub(crate) fn run(
+        &mut self,
+        mut rows: Range<u64>,
+        lines: &mut String,
+        warnings: &mut Vec<(u64, String)>,
+    ) -> Result<(), Error> {
         let mut idle = 0;
         while !rows.is_empty() {
             // Only the row that it has announced can have caused the crash.
@@ -83,6 +88,7 @@ impl<'a> Process<'a> {
                         Err(died) => break Some(died),
                         Ok(answer) => match answer.split_once(' ') {
                             Some(("row", row)) => announced = row.parse::<u64>().ok(),
+                            Some(("warning", text)) => warnings.push((rows.start, text.into())),
                             Some(("line", line)) => {
                                 lines.push_str(line);
                                 lines.push('\n');
@@ -222,7 +228,12 @@ fn answer(writer: &mut Writer<'_>, rows: Range<u64>) -> Result<(), Error> {
     for row in rows {
         say(&format!("row {row}"))?;
         match writer.run(row) {
-            Ok(line) => say(&format!("line {}", line.trim_end()))?,
+            Ok(line) => {
+                if let Some(warning) = writer.warning() {
+                    say(&format!("warning {warning}"))?;
+                }
+                say(&format!("line {}", line.trim_end()))?;
+            }
             Err(error) => return say(&format!("error {error}")),
         }
     }

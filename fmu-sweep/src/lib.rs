@@ -44,7 +44,7 @@ pub use design::DesignRows;
 pub use error::Error;
 pub use fmu_import::threads::available as threads_here;
 pub use ordered::Ordered;
-pub use output::Failures;
+pub use output::{Failures, Warned};
 pub use plan::{Plan, ResultColumn, RunResult, RunResults, RunVariable, Runner, last_columns};
 pub use run::{Options, Progress, Report, missing, run};
 pub use sweep::Sweep;

@@ -34,6 +34,9 @@ enum Kind {
     Settling { target: f64, band: f64 },
 }
 
+/// Distance from the first level of a rise, as a share of the rise, within which a value begins at that level.
+const AT_LEVEL: f64 = 1e-3;
+
 /// The state of a measure during a run.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Reading {
@@ -177,7 +180,8 @@ impl Measure {
                 s.x = if first { 0.0 } else { s.x + piece };
             }
             Kind::Rise { from, to } => {
-                let passed = |level: f64| if to > from { x >= level } else { x <= level };
+                let passes = |x: f64, level: f64| if to > from { x >= level } else { x <= level };
+                let passed = |level: f64| passes(x, level);
                 let passage = |level: f64| {
                     let (t_0, x_0) = s.before;
                     if first || x.to_bits() == x_0.to_bits() {
@@ -186,7 +190,10 @@ impl Measure {
                         t_0 + (t - t_0) * ((level - x_0) / (x - x_0)).clamp(0.0, 1.0)
                     }
                 };
-                if s.since.is_none() && passed(from) {
+                // A value that begins beyond the first level has not crossed it.
+                let before =
+                    if first { (x - from).abs() <= AT_LEVEL * (to - from).abs() } else { !passes(s.before.1, from) };
+                if s.since.is_none() && before && passed(from) {
                     s.since = Some(passage(from));
                 }
                 if s.since.is_some() && s.until.is_none() && passed(to) {
@@ -260,6 +267,11 @@ mod tests {
             ("is = 'rise', from = 0.3, to = 2.7", 0.8),
             ("is = 'rise', from = 2, to = -3, after = 1", 6.0 / 7.0 - 1.0 / 7.0),
             ("is = 'rise', from = 1, to = 5", f64::INFINITY),
+            // It begins below both levels, and first falls to them later; it begins at the first one.
+            ("is = 'rise', from = 2.5, to = -1", 1.0 + 4.0 / 7.0 - (1.0 + 0.5 / 7.0)),
+            ("is = 'rise', from = -1, to = -3", 2.0 / 7.0),
+            ("is = 'rise', from = 4, to = 3.5", f64::INFINITY),
+            ("is = 'rise', from = 0, to = 1.5", 0.5),
             ("is = 'settling', target = 1.5, band = 0.5", 3.0),
             ("is = 'settling', target = 1.5, band = 0.5, after = 2", 1.0),
             ("is = 'settling', target = 1.5, band = 9", 0.0),

@@ -5,7 +5,7 @@ use crate::definition::{Definition, Interface, MeasureDefinition, SolverName};
 use crate::error::invalid;
 use crate::measure::{Measure, Reading};
 use crate::pool::{self, BLOCK};
-use crate::signal::{Signal, Sum, period};
+use crate::signal::{Signal, Sum, doubt, period};
 use fmu_import::{Fmu, Kind, Number, once};
 use fmu_system::cosimulation::{
     self, Integration, Method, PlanTarget, Recording, Settings, Solver, System, Units, Worker, item,
@@ -189,7 +189,7 @@ impl Plan {
         let system = Arc::clone(&shared.system);
         let of = |name: &str| system.columns().iter().find(|c| c.name == name);
         let mut mixed = Vec::new();
-        let columns = measures.iter().zip(&definition.measure).map(|((measure, sum), (name, _))| {
+        let columns = measures.iter().zip(&definition.measure).map(|((measure, sum), (name, definition))| {
             // The unit of a sum of several units, or of a sum with factors, is unknown.
             let units: Vec<&str> = sum.terms.iter().map(|(_, name)| of(name).map_or("", |c| &c.unit)).collect();
             let plain = sum.terms.iter().all(|(factor, _)| factor.abs().to_bits() == 1.0_f64.to_bits());
@@ -199,6 +199,9 @@ impl Plan {
                 mixed.push(format!(
                     "measure: {name}: its terms are in {one} and {other}: the numbers are added unchanged"
                 ));
+            }
+            if let Some(note) = definition.wrap.as_ref().and_then(|wrap| doubt(wrap, units[0])) {
+                mixed.push(format!("measure: {name}: {note}"));
             }
             let items = match &sum.terms[..] {
                 [(1.0, name)] if measure.is_a_value() => of(name).map(|c| c.items.clone()),
@@ -496,6 +499,16 @@ impl Runner {
     /// Whether the instances of a run are reset for the next; otherwise each run has new ones.
     pub fn reuse(&mut self, reuse: bool) {
         self.reuse = reuse;
+    }
+
+    /// Whether the FMUs are asked for warnings in the next run.
+    pub(crate) fn hear(&mut self, hears: bool) {
+        self.worker.hear(hears);
+    }
+
+    /// The first warning of the last run, if the FMUs are asked for them.
+    pub(crate) fn warning(&self) -> Option<String> {
+        self.worker.warning()
     }
 
     /// Runs with a value for each variable. `trace` receives the time and the traced variables at every communication point.

@@ -1,7 +1,7 @@
 //! A sweep into its folder: missing parts on threads, or in processes.
 
 use crate::isolate::{Isolation, Process};
-use crate::output::{Cut, Failures, Output, restart};
+use crate::output::{Cut, Failures, Output, Warned, restart};
 use crate::pool::{self, BLOCK};
 use crate::sweep::Writer;
 use crate::{Error, Sweep, files};
@@ -49,6 +49,8 @@ pub struct Report {
     pub results: Option<PathBuf>,
     /// Number of failed rows: among all results, or, while parts are missing, in this call.
     pub failures: Failures,
+    /// Rows of this call in which FMUs warned.
+    pub warned: Warned,
 }
 
 /// Runs the missing parts of the folder.
@@ -119,7 +121,7 @@ pub fn run(sweep: &Sweep, folder: &Path, options: &Options, watch: &dyn Progress
         },
         |executor, block| work.block(executor, block),
     )?;
-    let mut failures = state.into_inner().unwrap_or_else(PoisonError::into_inner).failures;
+    let Tally { mut failures, warned, .. } = state.into_inner().unwrap_or_else(PoisonError::into_inner);
     let missing = len(&output.missing());
     let mut results = None;
     if missing == 0 {
@@ -128,7 +130,7 @@ pub fn run(sweep: &Sweep, folder: &Path, options: &Options, watch: &dyn Progress
         results = Some(folder.join("results.csv"));
     }
     log.write(&format!("{rows} rows done, {} failed, {missing} parts missing", failures.count))?;
-    Ok(Report { rows, missing, results, failures })
+    Ok(Report { rows, missing, results, failures, warned })
 }
 
 /// Numbers of the missing parts and of all parts, and rows of a part; without a run and without output.
@@ -167,6 +169,7 @@ struct Tally {
     begun: HashMap<u64, Instant>,
     done: u64,
     failures: Failures,
+    warned: Warned,
 }
 
 struct Work<'a> {
@@ -189,16 +192,19 @@ impl Work<'_> {
         let range = pool::rows_of(of_part, length);
         let range = rows.start + range.start..rows.start + range.end;
         self.state().begun.entry(*part).or_insert_with(Instant::now);
-        let mut lines = String::new();
+        let (mut lines, mut warnings) = (String::new(), Vec::new());
         match executor {
             Executor::Here(writer) => {
                 for row in range.clone() {
                     lines.push_str(&writer.run(row)?);
+                    warnings.extend(writer.warning().map(|warning| (row, warning)));
                 }
             }
-            Executor::Process(process) => process.run(range.clone(), &mut lines)?,
+            Executor::Process(process) => process.run(range.clone(), &mut lines, &mut warnings)?,
         }
         let mut state = self.state();
+        state.warned.asked += range.clone().map(|row| u64::from(self.sweep.hears(row))).sum::<u64>();
+        warnings.into_iter().for_each(|(row, warning)| state.warned.add(row, warning));
         lines.lines().for_each(|line| state.failures.add(line));
         state.done += range.end - range.start;
         let (done, failed) = (state.done, state.failures.count);

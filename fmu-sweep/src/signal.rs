@@ -116,6 +116,15 @@ pub(crate) fn period(wrap: &SetValue) -> Result<f64, String> {
         .ok_or_else(|| format!("wrap = {text:?}, expected a period like \"2pi\" or 360"))
 }
 
+/// A note about a period that does not belong to this unit: an angle in rad repeats after a multiple of pi, no other unit has pi.
+pub(crate) fn doubt(wrap: &SetValue, unit: &str) -> Option<String> {
+    let period = period(wrap).ok()?;
+    let has_pi = (2.0 * period / PI - (2.0 * period / PI).round()).abs() < 1e-3;
+    let degrees = period.to_bits() == 360.0_f64.to_bits() && !["deg", "degree", "°"].contains(&unit);
+    (!unit.is_empty() && (has_pi != (unit == "rad") || degrees))
+        .then(|| format!("wrap = {wrap} is not a period of values in {unit}: 2pi is one in rad, 360 in deg"))
+}
+
 #[cfg(test)]
 #[expect(clippy::float_cmp, reason = "exact")]
 mod tests {
@@ -157,6 +166,19 @@ mod tests {
         assert_eq!(of("a", large, 0), Number::Integer(large));
         assert_eq!(of("a - 2 * b", large, 1), Number::Integer(large - 2));
         assert_eq!(of("a - 0.5 * b", 3, 1), Number::Real(2.5));
+    }
+
+    #[test]
+    fn a_period_belongs_to_its_unit() {
+        let doubted = |wrap: &str, unit: &str| doubt(&SetValue::Text(wrap.into()), unit).is_some();
+        for (wrap, unit) in
+            [("2pi", "rad"), ("6.2832", "rad"), ("pi", "rad"), ("360", "deg"), ("1", "rev"), ("2pi", "")]
+        {
+            assert!(!doubted(wrap, unit), "{wrap} {unit}");
+        }
+        for (wrap, unit) in [("360", "rad"), ("2pi", "deg"), ("2pi", "rad/s"), ("360", "rad/s"), ("1", "rad")] {
+            assert!(doubted(wrap, unit), "{wrap} {unit}");
+        }
     }
 
     #[test]

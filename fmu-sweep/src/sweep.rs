@@ -4,7 +4,7 @@ use crate::definition::{Runs, Traces, Which};
 use crate::error::invalid;
 use crate::plan::{RUN, last_columns};
 use crate::{Definition, DesignRows, Error, Plan, ResultColumn, RunResult, RunResults, RunVariable, Runner};
-use fmu_import::{Number, csv};
+use fmu_import::{Number, csv, printable};
 use fmu_system::cosimulation::item;
 use sha2::{Digest, Sha256};
 use std::fmt::Write;
@@ -135,6 +135,12 @@ impl Sweep {
         all
     }
 
+    /// Whether the FMUs are asked for warnings in this row: in all rows of a short sweep, and in one of 16 of a longer one, because an FMU
+    /// may take a third of a short run to look for them.
+    pub(crate) fn hears(&self, row: u64) -> bool {
+        self.rows.count() <= 1000 || row.is_multiple_of(16)
+    }
+
     /// The header of the results, with its line break.
     pub(crate) fn header(&self) -> String {
         csv::line(self.columns().iter().map(|column| &column.name))
@@ -219,10 +225,17 @@ pub(crate) struct Writer<'a> {
 }
 
 impl Writer<'_> {
+    /// The first warning of the FMUs in the last row, in one line, if the row [is heard](Sweep::hears).
+    pub(crate) fn warning(&self) -> Option<String> {
+        let text = self.runner.warning()?;
+        Some(printable(&text.split_whitespace().collect::<Vec<_>>().join(" ")).into_owned())
+    }
+
     /// Runs a row; returns its line.
     pub(crate) fn run(&mut self, row: u64) -> Result<String, Error> {
         let Self { sweep, runner, values, traces, trace } = self;
         sweep.rows.row(row, values);
+        runner.hear(sweep.hears(row));
         let wanted = sweep.definition.trace.as_ref().filter(|wanted| match &wanted.runs {
             Runs::Rows(rows) => rows.contains(&row),
             Runs::Word(_) => true,

@@ -119,7 +119,7 @@ fn another_sweep_does_not_go_on_in_the_same_folder() {
     let folder = Folder::new();
     let copy = folder.path("drive.fmu");
     fs::copy(common::archives().join("fmi3/PmsmDrive.fmu"), &copy).unwrap();
-    let text = STARTS.replace("stop = 0.4", "stop = 0.01").replace("runs = 400", "runs = 40");
+    let text = STARTS.replace("stop = 0.4", "stop = 0.06").replace("runs = 400", "runs = 40");
     let define = |text: &str| {
         fs::write(folder.path("a.toml"), format!("fmus = ['d=drive.fmu']\n{text}")).unwrap();
         folder.path("a.toml")
@@ -131,7 +131,7 @@ fn another_sweep_does_not_go_on_in_the_same_folder() {
         (text.replace("seed = 7", "seed = 8"), "definition.design.seed is 7 there and 8 here"),
         (text.replace("runs = 40", "runs = 50"), "definition.design.runs is 40 there and 50 here"),
         (text.replace("\nlast", "\nfinal"), "sweep.json: is of another sweep: "),
-        (text.replace("stop = 0.01", "stop = 0.02"), "definition.stop is 0.01 there and 0.02 here"),
+        (text.replace("stop = 0.06", "stop = 0.07"), "definition.stop is 0.06 there and 0.07 here"),
     ] {
         let said = ends(&mut folder.sweep(&define(&other), "out"), 2);
         assert!(said.contains(part) && said.contains("--restart") && said.lines().count() == 1, "{part}: {said}");

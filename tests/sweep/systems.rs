@@ -66,6 +66,38 @@ fn a_sum_of_two_units_is_noted() {
 }
 
 /// Enumerations have their names in the results, in measures of their values and in traces; a list of names runs again.
+/// A plant whose resistance is in mOhm, in half of the rows.
+#[test]
+fn warnings_of_the_fmus_are_counted() {
+    let folder = Folder::new();
+    let text = |runs: u32, values: &str| {
+        format!(
+            "stop = 2e-3\ndesign = {{ kind = 'random', runs = {runs} }}\n\
+             [vary]\n'd.controller.motor.R_s' = {{ values = {values} }}\n[measure]\nm = {{ of = 'd.speed', is = 'final' }}\n"
+        )
+    };
+    let said = |name: &str, text: &str, isolate: bool| {
+        let file = folder.define(&format!("{name}.toml"), text);
+        let mut command = folder.sweep(&file, &format!("{name}-{isolate}"));
+        if isolate {
+            command.arg("--isolate");
+        }
+        ends(&mut command, 0)
+    };
+    let half = [false, true].map(|isolate| said("half", &text(64, "[1.8, 1800]"), isolate));
+    assert_eq!(half[0], half[1]);
+    let count: u32 = half[0].split_once("warning: ").unwrap().1.split(' ').next().unwrap().parse().unwrap();
+    assert!((10..54).contains(&count), "{}", half[0]);
+    assert!(half[0].contains(" of 64 rows have warnings; the first, in row "), "{}", half[0]);
+    assert!(half[0].contains(": controller.motor.R_s = 1800 Ohm is "), "{}", half[0]);
+    let many = said("many", &text(1600, "[1800]"), false);
+    assert!(
+        many.contains("warning: 100 of 100 rows that were asked have warnings; the first, in row 0: d: "),
+        "{many}"
+    );
+    assert!(!said("none", &text(8, "[1.8]"), false).contains("warning"));
+}
+
 #[test]
 fn enumerations_keep_their_names() {
     let folder = Folder::new();
@@ -182,7 +214,11 @@ fn the_files_of_the_documentation_run() {
     let file = fs::read_to_string(root.join("examples/sweep.toml")).unwrap();
     let fewer = file.replace("runs = 100000", "runs = 256").replace("../target/fmu/fmi3/", "");
     fs::write(folder.path("example.toml"), fewer).unwrap();
-    assert_eq!(ends(&mut folder.sweep(&folder.path("example.toml"), "example"), 0), "");
+    let said = ends(&mut folder.sweep(&folder.path("example.toml"), "example"), 0);
+    assert!(
+        said.contains(" of 256 rows have warnings; the first, in row 0: d: at ") && said.lines().count() == 1,
+        "{said}"
+    );
     let angle = |row: &String| row.split(',').nth(6).unwrap().parse::<f64>().unwrap();
     let lost = folder.rows("example").iter().filter(|row| angle(row).abs() > std::f64::consts::FRAC_PI_2).count();
     println!("{lost} of 256 starts lost");

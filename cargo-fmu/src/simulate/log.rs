@@ -2,6 +2,7 @@
 
 use crate::message;
 use fmu_import::{Message, Status, printable, printable_lines};
+use fmu_system::cosimulation::with_name;
 use std::collections::BTreeSet;
 
 /// Maximum number of different warnings shown without `--logging`.
@@ -27,9 +28,7 @@ impl Log {
             if self.all {
                 eprintln!("{instance}: {status} [{}] {text}", printable(category));
             } else if *status == Status::WARNING {
-                // Many FMUs begin with the name of the instance.
-                let named = text.strip_prefix(&*instance).is_some_and(|rest| rest.starts_with(": "));
-                self.warn(if named { text.into_owned() } else { format!("{instance}: {text}") });
+                self.warn(with_name(&instance, text.into_owned()));
             }
         }
     }

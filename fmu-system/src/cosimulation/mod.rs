@@ -56,7 +56,7 @@ pub use exchange::Inputs;
 pub use grid::{CoarseSteps, Settings};
 pub use method::{Integration, Method};
 pub use plan::{PlanTarget, SystemPlan, Worker};
-pub use point::{CommunicationPoint, Ended};
+pub use point::{CommunicationPoint, Ended, with_name};
 pub use recording::{Column, Recording, TextColumn, item};
 pub use schedule::{Schedule, Sine};
 pub use sequence::Sequence;

@@ -26,12 +26,13 @@ use super::grid::{CoarseSteps, Grid, Settings};
 use super::method::Method;
 use super::parts::{Part, Parts, Port};
 use super::point::Ended;
+use super::point::{take_messages, with_name};
 use super::recording::{Column, Recording};
 use super::run::simulate;
 use super::schedule::{Schedule, Sine};
 use super::system::System;
 use super::wiring::{Change, Outlet, Record, Source, Wiring};
-use fmu_import::{Error, Fmu, Instance, Kind, Logging, Number, Values};
+use fmu_import::{Error, Fmu, Instance, Kind, Logging, Number, Status, Values};
 use model_description::{BaseType, Causality, Conversion, Interface, Variability, parse_number};
 use std::ops::ControlFlow;
 use std::sync::atomic::{AtomicU32, Ordering};
@@ -323,6 +324,8 @@ impl SystemPlan {
             exchange: self.exchange.clone(),
             row: Vec::new(),
             used: false,
+            hears: false,
+            heard: false,
         };
         worker.renew()?;
         Ok(worker)
@@ -339,6 +342,9 @@ pub struct Worker {
     exchange: Exchange,
     row: Vec<Number>,
     used: bool,
+    /// Whether the FMUs are asked for warnings in the next run, and whether they were in the last one.
+    hears: bool,
+    heard: bool,
 }
 
 impl Worker {
@@ -386,6 +392,19 @@ impl Worker {
         Ok(recording)
     }
 
+    /// Whether the FMUs are asked for warnings in the next runs. By default they are not, because looking for them can take longer than a
+    /// short run.
+    pub fn hear(&mut self, hears: bool) {
+        self.hears = hears;
+    }
+
+    /// The first warning of the last run, with the name of the instance.
+    pub fn warning(&self) -> Option<String> {
+        let mut all = take_messages(&self.instances).into_iter();
+        let (name, message) = all.find(|(_, message)| message.status == Status::WARNING)?;
+        Some(with_name(&name, message.text))
+    }
+
     /// Creates new instances, for an FMU whose reset is incomplete.
     ///
     /// # Errors
@@ -397,10 +416,9 @@ impl Worker {
         for (part, live) in self.plan.parts.0.iter().zip(self.plan.live.iter()) {
             let fmu = live.fmu();
             self.generations.push(live.generation());
-            // Nobody reads the warnings of thousands of runs, and some take longer than a short run.
             self.instances.push(fmu.instantiate_as(part.kind, &part.name, part.logging == Logging::All)?);
         }
-        self.used = false;
+        (self.used, self.heard) = (false, false);
         Ok(())
     }
 
@@ -419,6 +437,16 @@ impl Worker {
         // An FMU that cannot be reset still runs.
         if lost || (self.used && instances.iter_mut().any(|instance| instance.reset().is_err())) {
             self.renew()?;
+        }
+        // A reset may end it.
+        if self.hears || self.heard {
+            let mut asked =
+                self.plan.parts.0.iter().zip(&mut self.instances).filter(|(part, _)| part.logging != Logging::All);
+            if asked.any(|(_, instance)| instance.log_warnings(self.hears).is_err()) {
+                self.renew()?;
+            } else {
+                self.heard = self.hears;
+            }
         }
         for (part, instance) in self.plan.parts.0.iter().zip(&mut self.instances) {
             part.configure(instance)?;

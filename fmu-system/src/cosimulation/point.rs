@@ -63,3 +63,9 @@ pub(super) fn take_messages(instances: &[Instance]) -> Vec<(String, Message)> {
     let of = |i: &Instance| i.take_messages().into_iter().map(|m| (i.name().to_owned(), m)).collect::<Vec<_>>();
     instances.iter().flat_map(of).collect()
 }
+
+/// A message with the name of its instance, with which many FMUs begin.
+pub fn with_name(instance: &str, text: String) -> String {
+    let named = text.strip_prefix(instance).is_some_and(|rest| rest.starts_with(": "));
+    if named { text } else { format!("{instance}: {text}") }
+}

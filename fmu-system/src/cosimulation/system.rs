@@ -5,7 +5,7 @@ use super::grid::{Grid, Settings};
 use super::method::Method;
 use super::parts::{Part, Parts, Port, kind};
 use super::point::take_messages;
-use super::schedule::Schedule;
+use super::schedule::{SAME, Schedule};
 use super::sequence::Sequence;
 use super::wiring::{Outlet, Record, Source, Units, Wiring};
 use fmu_core::Need;
@@ -98,6 +98,13 @@ impl System {
                 self.notes.push(format!("{name}: {cause}"));
             }
         }
+        let never = self.wiring.jumps().filter_map(|(port, times)| {
+            let first = *times.first().filter(|t| **t > settings.stop + SAME)?;
+            let (name, stop) = (self.instances[port.instance].name(), settings.stop);
+            Some(format!("{name}.{}: its value first changes at {first} s, after the stop time of {stop} s", port.name))
+        });
+        let never: Vec<String> = never.collect();
+        self.notes.extend(never);
         let meets = self.meets();
         let late = self.wiring.jumps().filter_map(|(port, times)| {
             let instance = &self.instances[port.instance];

@@ -92,6 +92,11 @@ fn a_jump_between_two_communication_points_is_met_or_acts_late_with_a_note() {
         {
             assert_eq!(run(&fmu, points, method).1, [""; 0], "{points}");
         }
+        // A time in ms.
+        assert_eq!(
+            run(&fmu, "0:0,300:1", Method::default()).1,
+            ["p.u: its value first changes at 300 s, after the stop time of 1 s"]
+        );
         // x' = u - x from 1: u is 1 until 0.25 s, then 3.
         let solved = |t: f64| 3.0 - 2.0 * f64::exp(-(1.0 - t));
         let (x, notes) = run(&fmu, "0:1,0.25:3", Method::default());
