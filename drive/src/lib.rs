@@ -25,9 +25,11 @@ pub mod pair;
 pub mod pmsm_drive;
 pub mod pmsm_drive_mean;
 mod rules;
+mod speed_watch;
 pub mod steady;
 mod terminals;
 pub mod torque;
+mod unsettled;
 
 pub use drive_base::{frame, implausible, integrate, math, modulation, motor, overmodulation};
 pub use drive_control::clocked::SensorlessControllerClocked;

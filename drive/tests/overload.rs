@@ -82,6 +82,11 @@ fn a_loop_too_weak_for_its_load_is_reported() {
 
 /// The message about a speed reference (rad/s) that is not reached, in 12 s.
 fn not_reached<M: Model + Warns>(set: impl FnOnce(&mut M)) -> Option<String> {
+    said("speed_ref", set)
+}
+
+/// The first message with this key in 12 s.
+fn said<M: Model + Warns>(of: &str, set: impl FnOnce(&mut M)) -> Option<String> {
     let (mut block, mut now, mut said) = (Block::<M>::default(), Elapsed::ZERO, None);
     set(&mut block.model);
     block.initialize();
@@ -90,12 +95,48 @@ fn not_reached<M: Model + Warns>(set: impl FnOnce(&mut M)) -> Option<String> {
         block.step(&step).unwrap();
         now = step.end();
         block.model.warn(&mut Warnings::to(&mut |(_, key, text): Said<'_>| {
-            if key == "speed_ref" {
+            if key == of {
                 said.get_or_insert_with(text);
             }
         }));
     }
     said
+}
+
+/// A torque that follows in 2 s, or only on one side of standstill.
+#[test]
+fn a_speed_that_does_not_settle_is_reported() {
+    let mean = |bandwidth: f64| {
+        said("settles", |m: &mut PmsmDriveMean| {
+            (m.drive.controller.current.bandwidth, m.inputs.speed_ref, m.inputs.tau_load) = (bandwidth, 50.0, 1.0);
+        })
+    };
+    let mapped = |bandwidth: f64, peak: f64| {
+        said("settles", |m: &mut MappedDrive| {
+            (m.bandwidth, m.inputs.speed_ref, m.inputs.tau_load) = (bandwidth, 50.0, 1.0);
+            m.map.tau_motor.fill(peak);
+        })
+    };
+    for (name, text) in [("mean", mean(0.5)), ("mapped", mapped(0.5, 6.0)), ("one side", mapped(500.0, 0.6))] {
+        let text = text.expect(name);
+        println!("{name}: {text}");
+        assert!(text.contains("does not settle at speed_ref = 50 rad/s"), "{name}: {text}");
+    }
+    assert_eq!((mean(500.0), mapped(500.0, 6.0), mapped(200.0, 6.0)), (None, None, None));
+}
+
+/// Losses in mW, and tables for a voltage in kV, are reported at the first step.
+#[test]
+fn tables_in_another_unit_are_reported() {
+    let losses = said("map.p_loss", |m: &mut MappedDrive| {
+        m.map.p_loss.as_flattened_mut().iter_mut().for_each(|p| *p *= 1e3);
+    });
+    assert!(losses.is_some_and(|text| text.contains("check that map.p_loss is in W")));
+    let voltage = said("map.u_dc", |m: &mut MappedDrive| m.map.u_dc *= 1e-3);
+    assert!(voltage.is_some_and(|text| text.contains("u_dc = 325 V is more than 3 times map.u_dc = 0.325 V")));
+    for key in ["map.p_loss", "map.u_dc"] {
+        assert_eq!(said(key, |_: &mut MappedDrive| ()), None);
+    }
 }
 
 /// 3000 rpm are 314 rad/s: 3000 rad/s are beyond the voltage of the link.

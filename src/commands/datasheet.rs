@@ -86,7 +86,7 @@ pub fn run(args: &Datasheet) -> Result<()> {
 
 /// What the data sheet gives.
 fn text(sheet: &MappedSheet) -> String {
-    let ([power, at], [efficiency, n, tau]) = sheet.best();
+    let ([power, at], [efficiency, n, tau]) = sheet.map.best();
     let map = &sheet.map;
     let rpm = |n: f64| rounded(n / RPM, 4);
     let most = |values: &[f64]| rounded(values.iter().copied().fold(0.0, f64::max), 4);

@@ -14,7 +14,7 @@ pub mod remarks;
 
 use crate::error::Result;
 use crate::tune::setting::Value;
-use drive::mapped_drive::map::{Map, SHARES, SPEEDS, share};
+use drive::mapped_drive::map::Map;
 use file::DataSheet;
 use remarks::Remarks;
 use serde_json::json;
@@ -96,26 +96,6 @@ impl MappedSheet {
             ("plant.mechanics.J", Value::Real(self.J)),
             ("controller.current.bandwidth", Value::Real(self.bandwidth)),
         ]
-    }
-
-    /// The greatest power at the shaft (W) with its speed (rad/s), and the best efficiency with its speed and torque (N.m), as a
-    /// motor, at the points of the tables.
-    pub fn best(&self) -> ([f64; 2], [f64; 3]) {
-        let (mut power, mut best) = ([0.0; 2], [0.0; 3]);
-        for k in 0..SPEEDS {
-            let (n, peak) = (self.map.speed[k], self.map.tau_motor[k]);
-            if n * peak > power[0] {
-                power = [n * peak, n];
-            }
-            for j in SHARES / 2 + 1..SHARES {
-                let tau = peak * share(j);
-                let efficiency = n * tau / (n * tau + self.map.p_loss[k][j]);
-                if efficiency > best[0] {
-                    best = [efficiency, n, tau];
-                }
-            }
-        }
-        (power, best)
     }
 }
 

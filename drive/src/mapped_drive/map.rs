@@ -15,10 +15,11 @@
 //! the losses at n itself and the torque itself. Between two voltages the losses at one speed and torque differ by the current
 //! of field weakening and the switching loss, which a data sheet does not separate; reading them at the scaled speed would scale
 //! friction and iron loss too, which is worse. Beyond the peak torque of `map.u_dc`, where a higher voltage allows more, the part
-//! of the losses that depends on the torque grows with its square.
+//! of the losses that depends on the torque grows with its square. A torque that still falls to a smaller limit has the losses of that
+//! limit.
 
 use fmu_core::unit::{NEWTON_METER, SECOND, SPEED, VOLT, WATT};
-use fmu_core::{Fault, Row, Table, table};
+use fmu_core::{Fault, Row, Table, digits, table};
 use serde::{Deserialize, Serialize};
 
 /// Number of speeds of the tables.
@@ -106,6 +107,9 @@ impl Cell {
 /// Width of the band above the last speed over which the torque falls to 0, as a share of that speed.
 const BEYOND: f64 = 0.01;
 
+/// Minimum and maximum of the best efficiency of a drive.
+const EFFICIENCY: [f64; 2] = [0.2, 0.999];
+
 /// Speed in rad/s below which the drag torque falls to 0.
 pub(super) const SLOW: f64 = 1.0;
 
@@ -157,6 +161,43 @@ impl Map {
         self.cell(w.abs()).of(&self.tau_drag) * (w / SLOW).clamp(-1.0, 1.0)
     }
 
+    /// The maximum power at the shaft (W) with its speed (rad/s), and the best efficiency with its speed and torque (N.m), as a
+    /// motor, at the points of the tables.
+    pub fn best(&self) -> ([f64; 2], [f64; 3]) {
+        let (mut power, mut best) = ([0.0; 2], [0.0; 3]);
+        for k in 0..SPEEDS {
+            let (n, peak) = (self.speed[k], self.tau_motor[k]);
+            if n * peak > power[0] {
+                power = [n * peak, n];
+            }
+            for j in HALF + 1..SHARES {
+                let tau = peak * share(j);
+                let efficiency = n * tau / (n * tau + self.p_loss[k][j]);
+                if efficiency > best[0] {
+                    best = [efficiency, n, tau];
+                }
+            }
+        }
+        (power, best)
+    }
+
+    /// A message about losses of no drive; tables without losses describe an ideal one.
+    pub(super) fn doubt(&self) -> Option<String> {
+        let (_, [efficiency, n, tau]) = self.best();
+        let [least, most] = EFFICIENCY;
+        if (least..=most).contains(&efficiency) || self.p_loss.as_flattened().iter().all(|p| *p == 0.0) {
+            return None;
+        }
+        let percent = |share: f64| digits::text(100.0 * share, 4, 1e6);
+        Some(format!(
+            "the best efficiency of map.p_loss is {} %, at {n} rad/s and {tau} N.m; that of a drive is between {} and {} %: check that \
+             map.p_loss is in W, map.tau_motor in N.m and map.speed in rad/s",
+            percent(efficiency),
+            percent(least),
+            percent(most)
+        ))
+    }
+
     /// Refuses tables that describe no drive.
     ///
     /// # Errors
@@ -190,8 +231,9 @@ impl Map {
 impl At<'_> {
     /// Losses in W at the torque `tau` (N.m) of the direction of rotation.
     pub(super) fn loss(&self, tau: f64) -> f64 {
-        let limit = self.reference[usize::from(tau < 0.0)];
-        let x = if limit > 0.0 { tau / limit } else { 0.0 };
+        let side = usize::from(tau < 0.0);
+        let (limit, most) = (self.reference[side], self.reference[side].max(self.peak[side]));
+        let x = if limit > 0.0 { tau.clamp(-most, most) / limit } else { 0.0 };
         let inside = x.clamp(-1.0, 1.0);
         let loss = self.read(inside);
         if x.abs() <= 1.0 {
@@ -331,6 +373,29 @@ mod tests {
         let at = map.at(400.0, 2.0 * map.u_dc);
         assert!((at.peak[0] - 6.0).abs() < 1e-12);
         assert!((at.loss(3.0 + 1e-9) - at.loss(3.0)).abs() < 1e-6 && at.loss(6.0) > at.loss(3.0) + 300.0);
+    }
+
+    /// A torque of 1 N.m beyond a peak of 0.006 N.m would have 27,778 times the losses of that peak.
+    #[test]
+    fn a_torque_that_falls_to_its_limit_has_the_losses_of_the_limit() {
+        let map = Map { tau_motor: [6e-3; SPEEDS], ..Map::default() };
+        let at = map.at(1.0, map.u_dc);
+        assert!((at.loss(1.0) - at.loss(6e-3)).abs() < 1e-12, "{} W", at.loss(1.0));
+        assert!(at.loss(-7.0) > at.loss(-1.0) && (at.loss(-7.0) - at.loss(-6.0)).abs() < 1e-12);
+    }
+
+    #[test]
+    fn losses_in_another_unit_are_doubted() {
+        let scaled = |by: f64| {
+            let mut map = Map::default();
+            map.p_loss.as_flattened_mut().iter_mut().for_each(|p| *p *= by);
+            map.doubt()
+        };
+        for by in [0.0, 0.1, 1.0, 10.0] {
+            assert_eq!(scaled(by), None, "{by}");
+        }
+        assert!(scaled(1e-3).unwrap().contains("is 99.9"));
+        assert!(scaled(1e3).unwrap().contains("map.p_loss is in W"));
     }
 
     #[test]

@@ -27,8 +27,8 @@ mod state;
 
 pub use state::{MappedDrive, MappedInputs, MappedOutputs, MappedShaft};
 
-use crate::backward::Backward;
 use crate::happened::Happened;
+use crate::speed_watch::{SpeedWatch, Watched};
 use drive_base::math::all_finite;
 use drive_control::idle::NO_VOLTAGE;
 use drive_control::model::clipped;
@@ -118,7 +118,7 @@ impl Model for MappedDrive {
 
     const ICON: Option<&'static str> = Some(include_str!("../../icons/pmsm_drive.svg"));
 
-    const STATE_VERSION: u16 = 5;
+    const STATE_VERSION: u16 = 6;
 
     const CONTINUOUS: bool = true;
 
@@ -139,8 +139,9 @@ impl Model for MappedDrive {
         self.state = State { speed, angle, speed_ref: speed, ..State::default() };
         (self.energy, self.active) = (Energy::default(), self.is_active());
         self.last = self.instant(&self.state, &self.point(&self.state));
-        (self.overspeed, self.off_voltage, self.clipped_for) = (Happened::default(), Happened::default(), 0.0);
-        (self.load, self.backward) = (Overload::default(), Backward::default());
+        (self.first, self.overspeed, self.off_voltage, self.far_voltage) = Default::default();
+        self.clipped_for = 0.0;
+        self.watch = SpeedWatch::default();
     }
 
     fn output(&self, _now: Elapsed, out: &mut MappedOutputs) {
@@ -157,20 +158,25 @@ impl Model for MappedDrive {
         let point = self.point(&state);
         let speeds = [&self.state, &state].map(|state| self.speed(state));
         let controls = self.is_active() && !self.speed_loop.torque_mode;
-        self.backward.update(step.h, controls, state.speed_ref, speeds[1]);
         let limited = controls && Overload::limited(state.tau, point.limits, state.speed_ref - speeds[1]);
-        self.load.update(step.h, limited, state.speed_ref, speeds);
+        let (imposed, tau_load, speed_ref) = (self.shaft.imposed, self.inputs.tau_load, state.speed_ref);
+        self.watch.update(step.h, &Watched { controls, imposed, limited, speed_ref, tau_load, speeds });
         self.state = state;
         self.last = self.instant(&state, &point);
         self.overspeed = self.overspeed.followed_by(self.speed(&state).abs() > self.map.last());
         let off = self.inputs.enable && self.inputs.u_dc > 0.0 && !self.has_voltage();
         self.off_voltage = self.off_voltage.followed_by(off);
+        self.far_voltage = self.far_voltage.followed_by(self.is_active() && self.inputs.u_dc > FAR * self.map.u_dc);
+        self.first = self.first.followed_by(true);
         let [low, high] = point.limits;
         let (tau_ref, asked) = (self.inputs.tau_ref, self.speed_loop.torque_mode && self.is_active());
         self.clipped_for = if asked && (tau_ref > high || tau_ref < low) { self.clipped_for + step.h } else { 0.0 };
         Ok(())
     }
 }
+
+/// Multiple of `map.u_dc` beyond which the tables are of no use.
+const FAR: f64 = 3.0;
 
 impl Warns for MappedDrive {
     fn warn(&self, log: &mut Warnings<'_>) {
@@ -186,8 +192,22 @@ impl Warns for MappedDrive {
                 format!("u_dc = {u_dc} V is outside {u_min} to {u_max} V (map.u_min, map.u_max): the drive is off")
             });
         }
-        self.load.warn([speed, self.state.speed_ref], || self.point(&self.state).limits, log);
-        self.backward.warn(self.state.speed_ref, speed, log);
+        let bandwidths = [self.bandwidth, self.speed_loop.bandwidth];
+        self.watch.warn([speed, self.state.speed_ref], bandwidths, || self.point(&self.state).limits, log);
+        if self.first == Happened::Now
+            && let Some(doubt) = self.map.doubt()
+        {
+            log.warn("map.p_loss", || doubt.clone());
+        }
+        if self.far_voltage == Happened::Now {
+            let of_tables = self.map.u_dc;
+            log.warn("map.u_dc", || {
+                format!(
+                    "u_dc = {u_dc} V is more than {FAR} times map.u_dc = {of_tables} V: the tables do not describe the drive there; check \
+                     that both are in V"
+                )
+            });
+        }
         if self.clipped_for >= 1.0 {
             log.warn("tau_ref", || clipped(self.inputs.tau_ref, self.point(&self.state).limits));
         }

@@ -1,9 +1,8 @@
 //! The drive: its parameters, its state and its outputs.
 
 use super::map::Map;
-use crate::backward::Backward;
 use crate::happened::Happened;
-use drive_control::overload::Overload;
+use crate::speed_watch::SpeedWatch;
 use drive_control::speed::SpeedLoop;
 use drive_plant::power::Energy;
 use serde::{Deserialize, Serialize};
@@ -28,14 +27,15 @@ pub struct MappedDrive {
     pub(super) last: Last,
     /// Whether it has operated.
     pub(super) active: bool,
+    /// The first step, after which the tables are checked.
+    pub(super) first: Happened,
     pub(super) overspeed: Happened,
     pub(super) off_voltage: Happened,
+    pub(super) far_voltage: Happened,
     /// Time in s for which the torque reference has exceeded its limits.
     pub(super) clipped_for: f64,
-    /// Watch for a load above the torque of the drive.
-    pub(super) load: Overload,
-    /// The shaft against the direction of its reference.
-    pub(super) backward: Backward,
+    /// Whether the speed comes to its reference.
+    pub(super) watch: SpeedWatch,
 }
 
 /// Inputs.
@@ -93,11 +93,12 @@ impl Default for MappedDrive {
             energy: Energy::default(),
             last: Last::default(),
             active: false,
+            first: Happened::default(),
             overspeed: Happened::default(),
             off_voltage: Happened::default(),
+            far_voltage: Happened::default(),
             clipped_for: 0.0,
-            load: Overload::default(),
-            backward: Backward::default(),
+            watch: SpeedWatch::default(),
         }
     }
 }

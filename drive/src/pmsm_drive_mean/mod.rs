@@ -32,7 +32,6 @@ mod show;
 mod supply;
 
 use crate::apart;
-use crate::backward::Backward;
 use crate::beginning::{BEGINNING, BeginningParameters};
 use crate::dc_link::{LINK, LinkEnergy, LinkParameters};
 use crate::derating::DERATING;
@@ -40,6 +39,7 @@ use crate::happened::Happened;
 use crate::idle;
 use crate::pmsm_drive::{DriveInputs, DriveOutputs, INPUTS, OUTPUTS, in_part};
 use crate::rules::same_pole_pairs;
+use crate::speed_watch::{SpeedWatch, Watched};
 use crate::steady::{At, Condition, Diodes, Point, Steady, check_saturation};
 use crate::torque::{TORQUE, TorqueAt, TorqueParameters};
 use drive_base::frame::Dq;
@@ -103,14 +103,14 @@ pub struct PmsmDriveMean {
     moved: bool,
     /// Model Exchange: outputs of the controller since the last event.
     held: ControllerOutputs,
+    /// The first step, after which the data are compared.
+    first: Happened,
     /// Whether no drive can operate like this.
     impossible: Happened,
     /// Time in s for which the torque reference has exceeded its limits.
     clipped_for: f64,
-    /// Watch for a load above the torque of the drive.
-    overload: Overload,
-    /// The shaft against the direction of its reference.
-    backward: Backward,
+    /// Whether the speed comes to its reference.
+    watch: SpeedWatch,
     /// Always `None`: a drive in steady state does not commission itself.
     commissioning: Held,
 }
@@ -138,10 +138,10 @@ impl Default for PmsmDriveMean {
             gates_on: false,
             moved: false,
             held: ControllerOutputs::default(),
+            first: Happened::default(),
             impossible: Happened::default(),
             clipped_for: 0.0,
-            overload: Overload::default(),
-            backward: Backward::default(),
+            watch: SpeedWatch::default(),
             commissioning: None,
         }
     }
@@ -263,15 +263,19 @@ impl PmsmDriveMean {
         follows && self.inputs.enable && (tau_ref > high || tau_ref < low)
     }
 
-    /// The watch for a load above the torque of the drive after a step of `h` (s) to `state`.
-    fn watched(&self, h: f64, state: &State, point: &Point) -> Overload {
+    /// What the watch of the speed needs after a step to `state`.
+    fn watched(&self, state: &State, point: &Point) -> Watched {
         let speeds = [&self.state, state].map(|state| self.speed(state));
+        let controls = self.gates() && !self.torque_mode();
         let error = state.speed_ref - speeds[1];
-        let speed_mode = self.gates() && !self.torque_mode();
-        let mut overload = self.overload;
-        let limited = speed_mode && Overload::limited(state.tau, self.narrowed(state, point), error);
-        overload.update(h, limited, state.speed_ref, speeds);
-        overload
+        Watched {
+            controls,
+            imposed: self.drive.plant.mechanics.imposed,
+            limited: controls && Overload::limited(state.tau, self.narrowed(state, point), error),
+            speed_ref: state.speed_ref,
+            tau_load: self.inputs.tau_load,
+            speeds,
+        }
     }
 
     /// A plant with these parameters and inputs, to validate them.
@@ -330,7 +334,7 @@ impl Model for PmsmDriveMean {
 
     const ICON: Option<&'static str> = Some(include_str!("../../icons/pmsm_drive.svg"));
 
-    const STATE_VERSION: u16 = 12;
+    const STATE_VERSION: u16 = 13;
 
     const CONTINUOUS: bool = true;
 
@@ -398,9 +402,10 @@ impl Model for PmsmDriveMean {
         };
         self.state = State { speed, angle, speed_ref: controller.speed_est, ..State::default() };
         (self.energy, self.network, self.moved) = (Energy::default(), self.drive.start_temperatures(), false);
-        (self.clipped_for, self.impossible, self.link_energy) = (0.0, Happened::default(), LinkEnergy::default());
+        (self.clipped_for, self.first, self.impossible) = (0.0, Happened::default(), Happened::default());
+        self.link_energy = LinkEnergy::default();
         (self.known, self.point, self.trip) = (false, Point::default(), Trip::default());
-        (self.diodes, self.overload, self.backward) = (Diodes::default(), Overload::default(), Backward::default());
+        (self.diodes, self.watch) = (Diodes::default(), SpeedWatch::default());
         (self.follows, self.gates_on) = (self.inputs.modes.follows(), self.gates());
         self.begin_steadily();
         let temperatures = self.temperatures();
@@ -435,12 +440,12 @@ impl Model for PmsmDriveMean {
         let total = Energy::from(powers);
         self.energy.add(&Energy { r#in: total.r#in * step.h, mech: total.mech * step.h, loss: total.loss * step.h });
         self.link_energy.add(&self.link_powers(powers.p_in).times(step.h));
-        self.overload = self.watched(step.h, &state, &point);
-        let controls = self.gates() && !self.torque_mode();
-        self.backward.update(step.h, controls, state.speed_ref, self.speed(&state));
+        let watched = self.watched(&state, &point);
+        self.watch.update(step.h, &watched);
         (self.state, self.point, self.moved) = (state, point, true);
         (self.asked, self.known) = (self.question(&state, temperatures), true);
         self.impossible = self.impossible.followed_by(self.is_impossible());
+        self.first = self.first.followed_by(true);
         self.clipped_for = if self.is_clipped() { self.clipped_for + step.h } else { 0.0 };
         if thermal.mode == ThermalMode::Network {
             let (heat, coolant) = (thermal.heat(&powers.losses), self.inputs.thermal.coolant);
@@ -504,17 +509,20 @@ impl Warns for PmsmDriveMean {
             });
         }
         let speeds = [self.speed(&self.state), self.state.speed_ref];
-        self.overload.warn(speeds, || self.limits(&self.state, &self.point), log);
-        self.backward.warn(self.state.speed_ref, self.speed(&self.state), log);
+        let controller = &self.drive.controller;
+        let bandwidths = [controller.current.bandwidth, controller.speed_loop.bandwidth];
+        self.watch.warn(speeds, bandwidths, || self.limits(&self.state, &self.point), log);
         if self.clipped_for >= 1.0 {
             log.warn("tau_ref", || clipped(self.inputs.tau_ref, self.limits(&self.state, &self.point)));
         }
         self.drive.derating.warn(log);
         let plant = &self.drive.plant;
-        let drops = apart::drops(&plant.inverter.devices, self.drive.controller.limit.i, self.inputs.u_dc);
-        for (key, message) in [("apart", apart::message(plant, &self.drive.controller)), ("devices", drops)] {
-            if let Some(message) = message {
-                log.warn(key, || message.clone());
+        if self.first == Happened::Now {
+            let drops = apart::drops(&plant.inverter.devices, self.drive.controller.limit.i, self.inputs.u_dc);
+            for (key, message) in [("apart", apart::message(plant, &self.drive.controller)), ("devices", drops)] {
+                if let Some(message) = message {
+                    log.warn(key, || message.clone());
+                }
             }
         }
         plant.thermal.warn(&self.inputs.thermal, log);
