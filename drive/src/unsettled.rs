@@ -71,7 +71,7 @@ impl Unsettled {
     /// After an interval of `h` (s) in speed control that ends at this `speed` (rad/s), with the torque at its limit or not (`limited`).
     pub(crate) fn update(&mut self, h: f64, limited: bool, [speed_ref, tau_load]: [f64; 2], speed: f64) {
         let constant = [speed_ref, tau_load];
-        if constant != self.constant {
+        if constant.map(f64::to_bits) != self.constant.map(f64::to_bits) {
             *self = Self { constant, found: self.found, ..Self::default() };
         }
         self.free |= !limited;

@@ -204,7 +204,9 @@ impl Work<'_> {
         }
         let mut state = self.state();
         state.warned.asked += range.clone().map(|row| u64::from(self.sweep.hears(row))).sum::<u64>();
-        warnings.into_iter().for_each(|(row, warning)| state.warned.add(row, warning));
+        for (row, warning) in warnings {
+            state.warned.add(row, warning);
+        }
         lines.lines().for_each(|line| state.failures.add(line));
         state.done += range.end - range.start;
         let (done, failed) = (state.done, state.failures.count);
