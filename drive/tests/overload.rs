@@ -125,6 +125,25 @@ fn a_speed_that_does_not_settle_is_reported() {
     assert_eq!((mean(500.0), mapped(500.0, 6.0), mapped(200.0, 6.0)), (None, None, None));
 }
 
+/// A torque slower than the speed loop is reported at the first step.
+#[test]
+fn bandwidths_in_the_wrong_order_are_reported() {
+    let bandwidths = |bandwidth: f64, torque_mode: bool| {
+        let mean = said("bandwidth", |m: &mut PmsmDriveMean| {
+            let controller = &mut m.drive.controller;
+            (controller.current.bandwidth, controller.speed_loop.torque_mode) = (bandwidth, torque_mode);
+        });
+        let mapped = said("bandwidth", |m: &mut MappedDrive| {
+            (m.bandwidth, m.speed_loop.torque_mode) = (bandwidth, torque_mode);
+        });
+        [mean, mapped].map(|text| text.unwrap_or_default())
+    };
+    for text in bandwidths(20.0, false) {
+        assert!(text.contains("speed_loop.bandwidth = 80 rad/s is above current.bandwidth = 20 rad/s"), "{text}");
+    }
+    assert_eq!([bandwidths(100.0, false), bandwidths(20.0, true)].concat(), [""; 4]);
+}
+
 /// Losses in mW, and tables for a voltage in kV, are reported at the first step.
 #[test]
 fn tables_in_another_unit_are_reported() {

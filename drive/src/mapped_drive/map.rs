@@ -188,11 +188,14 @@ impl Map {
         if (least..=most).contains(&efficiency) || self.p_loss.as_flattened().iter().all(|p| *p == 0.0) {
             return None;
         }
-        let percent = |share: f64| digits::text(100.0 * share, 4, 1e6);
+        let short = |x: f64| digits::text(x, 4, 1e6);
+        let percent = |share: f64| short(100.0 * share);
         Some(format!(
-            "the best efficiency of map.p_loss is {} %, at {n} rad/s and {tau} N.m; that of a drive is between {} and {} %: check that \
+            "the best efficiency of map.p_loss is {} %, at {} rad/s and {} N.m; that of a drive is between {} and {} %: check that \
              map.p_loss is in W, map.tau_motor in N.m and map.speed in rad/s",
             percent(efficiency),
+            short(n),
+            short(tau),
             percent(least),
             percent(most)
         ))

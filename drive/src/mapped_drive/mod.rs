@@ -28,7 +28,7 @@ mod state;
 pub use state::{MappedDrive, MappedInputs, MappedOutputs, MappedShaft};
 
 use crate::happened::Happened;
-use crate::speed_watch::{SpeedWatch, Watched};
+use crate::speed_watch::{self, SpeedWatch, Watched};
 use drive_base::math::all_finite;
 use drive_control::idle::NO_VOLTAGE;
 use drive_control::model::clipped;
@@ -194,10 +194,13 @@ impl Warns for MappedDrive {
         }
         let bandwidths = [self.bandwidth, self.speed_loop.bandwidth];
         self.watch.warn([speed, self.state.speed_ref], bandwidths, || self.point(&self.state).limits, log);
-        if self.first == Happened::Now
-            && let Some(doubt) = self.map.doubt()
-        {
-            log.warn("map.p_loss", || doubt.clone());
+        if self.first == Happened::Now {
+            let order = speed_watch::order(bandwidths).filter(|_| !self.speed_loop.torque_mode && !self.shaft.imposed);
+            for (key, message) in [("map.p_loss", self.map.doubt()), ("bandwidth", order)] {
+                if let Some(message) = message {
+                    log.warn(key, || message.clone());
+                }
+            }
         }
         if self.far_voltage == Happened::Now {
             let of_tables = self.map.u_dc;

@@ -39,7 +39,7 @@ use crate::happened::Happened;
 use crate::idle;
 use crate::pmsm_drive::{DriveInputs, DriveOutputs, INPUTS, OUTPUTS, in_part};
 use crate::rules::same_pole_pairs;
-use crate::speed_watch::{SpeedWatch, Watched};
+use crate::speed_watch::{self, SpeedWatch, Watched};
 use crate::steady::{At, Condition, Diodes, Point, Steady, check_saturation};
 use crate::torque::{TORQUE, TorqueAt, TorqueParameters};
 use drive_base::frame::Dq;
@@ -519,7 +519,9 @@ impl Warns for PmsmDriveMean {
         let plant = &self.drive.plant;
         if self.first == Happened::Now {
             let drops = apart::drops(&plant.inverter.devices, self.drive.controller.limit.i, self.inputs.u_dc);
-            for (key, message) in [("apart", apart::message(plant, &self.drive.controller)), ("devices", drops)] {
+            let order = speed_watch::order(bandwidths).filter(|_| !self.torque_mode() && !plant.mechanics.imposed);
+            let apart = apart::message(plant, &self.drive.controller);
+            for (key, message) in [("apart", apart), ("devices", drops), ("bandwidth", order)] {
                 if let Some(message) = message {
                     log.warn(key, || message.clone());
                 }
