@@ -136,7 +136,7 @@ fn bandwidths_in_the_wrong_order_are_reported() {
         let mapped = said("bandwidth", |m: &mut MappedDrive| {
             (m.bandwidth, m.speed_loop.torque_mode) = (bandwidth, torque_mode);
         });
-        [mean, mapped].map(|text| text.unwrap_or_default())
+        [mean, mapped].map(Option::unwrap_or_default)
     };
     for text in bandwidths(20.0, false) {
         assert!(text.contains("speed_loop.bandwidth = 80 rad/s is above current.bandwidth = 20 rad/s"), "{text}");
