@@ -3,8 +3,8 @@
 //!
 //! ```text
 //! e = speed_ref - speed, over spans of 1 s:
-//! reported: the maximum of |e| exceeds |speed_ref|/10 + 5 rad/s and has not fallen by 2 % in three spans in succession, in each of which
-//!           e changes its sign, or the minimum of |e| is the same to |speed_ref|/500 + 0.01 rad/s
+//! reported: the maximum of |e| exceeds |speed_ref|/10 + 5 rad/s and has not fallen by 2 % in three spans in succession, in which the
+//!           minimum of |e| is the same to |speed_ref|/500 + 0.01 rad/s: 0 of an oscillation
 //! ```
 //!
 //! A start at the limit approaches its reference without crossing it, and a damped oscillation falls. A torque that is at its limit
@@ -29,16 +29,12 @@ struct Errors {
 impl Errors {
     const NONE: Self = Self { least: f64::INFINITY, most: f64::NEG_INFINITY };
 
-    fn crosses(self) -> bool {
-        self.least < 0.0 && self.most > 0.0
-    }
-
     /// Maximum of |e|.
     fn farthest(self) -> f64 {
         self.most.max(-self.least)
     }
 
-    /// Minimum of |e|.
+    /// Minimum of |e|: 0 if e changes its sign.
     fn nearest(self) -> f64 {
         self.least.max(-self.most).max(0.0)
     }
@@ -82,7 +78,7 @@ impl Unsettled {
             let (now, size) = (self.now, speed_ref.abs());
             let away = self.free && now.farthest() > 0.1 * size + 5.0 && now.farthest() >= 0.98 * self.last.farthest();
             let same = (now.nearest() - self.last.nearest()).abs() <= 0.002 * size + 0.01;
-            self.held = if away && (now.crosses() || same) { self.held.saturating_add(1) } else { 0 };
+            self.held = if away && same { self.held.saturating_add(1) } else { 0 };
             (self.last, self.now, self.time, self.free) = (now, Errors::NONE, 0.0, false);
         }
         self.found = self.found.followed_by(self.held >= MANY);
