@@ -1,4 +1,4 @@
-//! What the drives without sampling watch in speed control, each a way in which the speed does not come to its reference.
+//! Watches of the drives without sampling: the ways in which speed control fails to reach its reference.
 
 use crate::backward::Backward;
 use crate::unsettled::Unsettled;
@@ -68,8 +68,8 @@ impl SpeedWatch {
 pub(crate) fn order([torque, speed]: [f64; 2]) -> Option<String> {
     (speed > torque).then(|| {
         format!(
-            "speed_loop.bandwidth = {speed} rad/s is above current.bandwidth = {torque} rad/s: the speed oscillates, because the torque \
-             follows too slowly; make current.bandwidth at least four times as large"
+            "speed_loop.bandwidth = {speed} rad/s is above current.bandwidth = {torque} rad/s: the torque follows too slowly, and the speed \
+             overshoots or oscillates; make current.bandwidth at least four times as large"
         )
     })
 }

@@ -1,14 +1,14 @@
 //! Watch in speed control for a speed that does not come to rest at its reference, although reference and load are constant: a speed
-//! loop faster than the torque that it asks for, or a torque that acts at one side of standstill alone.
+//! loop faster than the torque that it asks for, or a torque limit that acts on one side of standstill only.
 //!
 //! ```text
 //! e = speed_ref - speed, over spans of 1 s:
 //! reported: the maximum of |e| exceeds |speed_ref|/10 + 5 rad/s and has not fallen by 2 % in three spans in succession, in which the
-//!           minimum of |e| is the same to |speed_ref|/500 + 0.01 rad/s: 0 of an oscillation
+//!           minimum of |e| is the same to |speed_ref|/500 + 0.01 rad/s (0 in an oscillation)
 //! ```
 //!
-//! A start at the limit approaches its reference without crossing it, and a damped oscillation falls. A torque that is at its limit
-//! throughout is the matter of [`Overload`](drive_control::overload::Overload). Derived here; speeds are mechanical, in rad/s.
+//! A start at the limit approaches its reference without crossing it, and a damped oscillation falls. [`Overload`](drive_control::overload::Overload) reports
+//! a torque that stays at its limit. Derived here; speeds are mechanical, in rad/s.
 
 use crate::happened::Happened;
 use fmu_core::log::Warnings;

@@ -87,7 +87,7 @@ fn report(report: &Report, sweep: &Definition, args: &Sweep) -> Result<bool> {
     let Report { rows, missing, results, failures, warned } = report;
     if let Some((row, warning)) = &warned.first {
         let Warned { asked, count, .. } = warned;
-        let of = if asked == rows { format!("{rows} rows") } else { format!("{asked} rows that were asked") };
+        let of = if asked == rows { format!("{rows} rows") } else { format!("the {asked} checked rows") };
         message::warning(&format!("{count} of {of} have warnings; the first, in row {row}: {warning}"));
     }
     for (row, error) in &failures.first {

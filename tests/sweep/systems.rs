@@ -91,10 +91,7 @@ fn warnings_of_the_fmus_are_counted() {
     assert!(half[0].contains(" of 64 rows have warnings; the first, in row "), "{}", half[0]);
     assert!(half[0].contains(": controller.motor.R_s = 1800 Ohm is "), "{}", half[0]);
     let many = said("many", &text(1600, "[1800]"), false);
-    assert!(
-        many.contains("warning: 100 of 100 rows that were asked have warnings; the first, in row 0: d: "),
-        "{many}"
-    );
+    assert!(many.contains("warning: 100 of the 100 checked rows have warnings; the first, in row 0: d: "), "{many}");
     assert!(!said("none", &text(8, "[1.8]"), false).contains("warning"));
 }
 

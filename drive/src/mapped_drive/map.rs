@@ -181,7 +181,7 @@ impl Map {
         (power, best)
     }
 
-    /// A message about losses of no drive; tables without losses describe an ideal one.
+    /// A message about implausible losses; tables without any losses describe an ideal drive.
     pub(super) fn doubt(&self) -> Option<String> {
         let (_, [efficiency, n, tau]) = self.best();
         let [least, most] = EFFICIENCY;

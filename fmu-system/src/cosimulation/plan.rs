@@ -398,8 +398,11 @@ impl Worker {
         self.hears = hears;
     }
 
-    /// The first warning of the last run, with the name of the instance.
+    /// The first warning of the last run, with the name of the instance; none if the FMUs were not asked, because some warn unasked.
     pub fn warning(&self) -> Option<String> {
+        if !self.heard {
+            return None;
+        }
         let mut all = take_messages(&self.instances).into_iter();
         let (name, message) = all.find(|(_, message)| message.status == Status::WARNING)?;
         Some(with_name(&name, message.text))

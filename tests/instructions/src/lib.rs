@@ -4,7 +4,7 @@
 //! A separate process runs a subject `n` times, another one 2 `n` times: their difference excludes the start of the process and the first
 //! call. The native drive is compiled with the optimized test profile; the FMUs are the packed ones.
 //!
-//! A package of its own: the other tests of `tests/` compile without optimization.
+//! It is a separate package because the other programs in `tests/` compile without optimization.
 #![allow(missing_docs)]
 #![cfg(all(test, target_os = "linux", target_arch = "x86_64"))]
 
