@@ -55,7 +55,7 @@ impl SpeedWatch {
         limits: impl FnOnce() -> [f64; 2],
         log: &mut Warnings<'_>,
     ) {
-        self.overload.warn(speeds, limits, log);
+        self.overload.warn(false, speeds, limits, log);
         self.backward.warn(speeds[1], speeds[0], log);
         self.unsettled.warn(bandwidths, log);
     }

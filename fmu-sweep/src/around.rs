@@ -55,8 +55,12 @@ impl Plan {
             |(runner, worker, [above, below]), block| {
                 let k = index(block);
                 row(k, above);
+                let mut warning = None;
                 let outcomes = if k == 0 {
-                    vec![(0, runner.run(above, &mut |_, _| {}))]
+                    runner.hear(true);
+                    let outcome = runner.run(above, &mut |_, _| {});
+                    warning = runner.warning();
+                    vec![(0, outcome)]
                 } else {
                     row(k + n, below);
                     let set = variables.iter().map(RunVariable::targets).zip(&*above);
@@ -66,6 +70,7 @@ impl Plan {
                     vec![(k, above), (k + n, below)]
                 };
                 let mut all = all.lock().unwrap_or_else(PoisonError::into_inner);
+                warning.into_iter().for_each(|text| all.0.warned.add(0, text));
                 all.1 += count(outcomes.len());
                 for (k, outcome) in outcomes {
                     all.0.put(k, outcome);

@@ -38,13 +38,15 @@ mod pool;
 mod run;
 mod signal;
 mod sweep;
+mod warned;
 
 pub use definition::{Definition, MeasureDefinition};
 pub use design::DesignRows;
 pub use error::Error;
 pub use fmu_import::threads::available as threads_here;
 pub use ordered::Ordered;
-pub use output::{Failures, Warned};
+pub use output::Failures;
 pub use plan::{Plan, ResultColumn, RunResult, RunResults, RunVariable, Runner, last_columns};
 pub use run::{Options, Progress, Report, missing, run};
 pub use sweep::Sweep;
+pub use warned::Warned;

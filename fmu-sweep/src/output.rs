@@ -65,26 +65,6 @@ impl Failures {
     }
 }
 
-/// Number of rows in which FMUs warned, and the first of them with its warning.
-#[derive(Clone, Debug, Default, PartialEq, Eq)]
-pub struct Warned {
-    /// Number of rows whose FMUs were asked for warnings.
-    pub asked: u64,
-    /// Number of rows with a warning.
-    pub count: u64,
-    /// The first row that warned.
-    pub first: Option<(u64, String)>,
-}
-
-impl Warned {
-    pub(crate) fn add(&mut self, row: u64, warning: String) {
-        self.count += 1;
-        if self.first.as_ref().is_none_or(|(first, _)| row < *first) {
-            self.first = Some((row, warning));
-        }
-    }
-}
-
 /// The identity of a sweep, in the order of `sweep.json`.
 fn identity(sweep: &Sweep) -> Result<Value, Error> {
     let definition = serde_json::to_value(sweep.definition()).map_err(|e| Error::Invalid(e.to_string()))?;

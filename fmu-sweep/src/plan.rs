@@ -6,7 +6,8 @@ use crate::error::invalid;
 use crate::measure::{Measure, Reading};
 use crate::pool::{self, BLOCK};
 use crate::signal::{Signal, Sum, doubt, period};
-use fmu_import::{Fmu, Kind, Number, once};
+use crate::warned::Warned;
+use fmu_import::{Fmu, Kind, Number, once, printable};
 use fmu_system::cosimulation::{
     self, Integration, Method, PlanTarget, Recording, Settings, Solver, System, Units, Worker, item,
 };
@@ -115,6 +116,8 @@ pub struct RunResults {
     pub end: Vec<f64>,
     /// The error.
     pub errors: Vec<Option<String>>,
+    /// Rows in which the FMUs warned.
+    pub warned: Warned,
 }
 
 impl Plan {
@@ -320,15 +323,21 @@ impl Plan {
         Ok(variable.targets.first().map_or(Ok(Number::Missing), number)?)
     }
 
-    /// Simulates once and records variables: `outputs`, or all outputs.
+    /// Simulates once and records variables: `outputs`, or all outputs. Also returns the different warnings of the FMUs.
     ///
     /// # Errors
     /// The variable does not exist, or an FMU refuses.
-    pub fn simulate(&self, values: &[(RunVariable, Number)], outputs: Option<&[String]>) -> Result<Recording, Error> {
+    pub fn simulate(
+        &self,
+        values: &[(RunVariable, Number)],
+        outputs: Option<&[String]>,
+    ) -> Result<(Recording, Vec<String>), Error> {
         let outputs = outputs.unwrap_or(&self.0.outputs);
         let variables = outputs.iter().map(|name| self.outlet(name)).collect::<Result<Vec<_>, Error>>()?;
         let mut worker = Arc::new(self.0.system.recording(&variables)?).worker()?;
-        Ok(worker.record(values.iter().flat_map(|(v, x)| v.targets.iter().map(|target| (target, *x))))?)
+        worker.hear(true);
+        let recording = worker.record(values.iter().flat_map(|(v, x)| v.targets.iter().map(|target| (target, *x))))?;
+        Ok((recording, worker.warnings()))
     }
 
     /// Creates a runner of one row after another, for one thread.
@@ -408,16 +417,19 @@ impl Plan {
             |_| Ok((self.runner(variables)?, Vec::new())),
             |(runner, values), block| {
                 let range = pool::rows_of(block, count);
-                let outcomes: Vec<RunResult> = range
+                let outcomes: Vec<_> = range
                     .clone()
                     .map(|index| {
                         row(index, values);
-                        runner.run(values, &mut |_, _| {})
+                        runner.hear(Warned::asks(index, count));
+                        (runner.run(values, &mut |_, _| {}), runner.warning())
                     })
                     .collect();
                 let mut all = all.lock().unwrap_or_else(PoisonError::into_inner);
-                for (index, outcome) in range.clone().zip(outcomes) {
+                for (index, (outcome, warning)) in range.clone().zip(outcomes) {
                     all.0.put(usize::try_from(index).unwrap_or(usize::MAX), outcome);
+                    all.0.warned.asked += u64::from(Warned::asks(index, count));
+                    warning.into_iter().for_each(|text| all.0.warned.add(index, text));
                 }
                 all.1 += range.end - range.start;
                 let done = all.1;
@@ -435,6 +447,7 @@ impl RunResults {
             measures: vec![vec![Number::Missing; rows]; measures],
             end: vec![f64::NAN; rows],
             errors: vec![None; rows],
+            warned: Warned::default(),
         }
     }
 
@@ -506,9 +519,10 @@ impl Runner {
         self.worker.hear(hears);
     }
 
-    /// The first warning of the last run, if the FMUs are asked for them.
+    /// The first warning of the last run, in one line, if the FMUs are asked for them.
     pub(crate) fn warning(&self) -> Option<String> {
-        self.worker.warning()
+        let text = self.worker.warnings().into_iter().next()?;
+        Some(printable(&text.split_whitespace().collect::<Vec<_>>().join(" ")).into_owned())
     }
 
     /// Runs with a value for each variable. `trace` receives the time and the traced variables at every communication point.

@@ -1,9 +1,10 @@
 //! A sweep into its folder: missing parts on threads, or in processes.
 
 use crate::isolate::{Isolation, Process};
-use crate::output::{Cut, Failures, Output, Warned, restart};
+use crate::output::{Cut, Failures, Output, restart};
 use crate::pool::{self, BLOCK};
 use crate::sweep::Writer;
+use crate::warned::Warned;
 use crate::{Error, Sweep, files};
 use fmu_import::threads;
 use std::collections::HashMap;

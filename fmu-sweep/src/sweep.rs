@@ -3,8 +3,9 @@
 use crate::definition::{Runs, Traces, Which};
 use crate::error::invalid;
 use crate::plan::{RUN, last_columns};
+use crate::warned::Warned;
 use crate::{Definition, DesignRows, Error, Plan, ResultColumn, RunResult, RunResults, RunVariable, Runner};
-use fmu_import::{Number, csv, printable};
+use fmu_import::{Number, csv};
 use fmu_system::cosimulation::item;
 use sha2::{Digest, Sha256};
 use std::fmt::Write;
@@ -135,10 +136,9 @@ impl Sweep {
         all
     }
 
-    /// Whether the FMUs are asked for warnings in this row: in all rows of a short sweep, and in one of 16 of a longer one, because an FMU
-    /// may take a third of a short run to look for them.
+    /// Whether the FMUs are [asked](Warned::asks) for warnings in this row.
     pub(crate) fn hears(&self, row: u64) -> bool {
-        self.rows.count() <= 1000 || row.is_multiple_of(16)
+        Warned::asks(row, self.rows.count())
     }
 
     /// The header of the results, with its line break.
@@ -225,10 +225,9 @@ pub(crate) struct Writer<'a> {
 }
 
 impl Writer<'_> {
-    /// The first warning of the FMUs in the last row, in one line, if the row [is heard](Sweep::hears).
+    /// The first warning of the FMUs in the last row, if the row [is heard](Sweep::hears).
     pub(crate) fn warning(&self) -> Option<String> {
-        let text = self.runner.warning()?;
-        Some(printable(&text.split_whitespace().collect::<Vec<_>>().join(" ")).into_owned())
+        self.runner.warning()
     }
 
     /// Runs a row; returns its line.

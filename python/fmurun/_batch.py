@@ -12,7 +12,8 @@ from ._instance import _described, _open
 class Batch(_core.Batch):
     """`n` instances of an FMU that step together, for reinforcement learning and, with n = 1, for loops written by hand.
 
-    Times begin at 0; instance k is at `steps * step_size` (s). All calls release Python's lock, and any thread may make them.
+    Times begin at 0; instance k is at `steps * step_size` (s). All calls release Python's lock, and any thread may make them. The first
+    warning of the FMUs after an initialization becomes a Python warning; `warned` has those of all instances.
 
     Args:
         fmu: an .fmu file

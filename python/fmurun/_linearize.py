@@ -90,7 +90,8 @@ def linearize(fmu, point=None, *, time=0.0, inputs=None, outputs=None, method=No
     wrong = [name for name, x in (*at.items(), *((v.name, x) for v, x in before)) if not np.isfinite(np.asarray(x, float)).all()]
     if wrong:
         raise ValueError(f"point: {wrong[0]} is not finite")
-    instance = _instance(opened, _kind(description, "ModelExchange", False, False), fmu)
+    # None asks the FMU for warnings alone.
+    instance = _instance(opened, _kind(description, "ModelExchange", False, False), fmu, None)
     try:
         instance._setup(None, float(time), None)
         _apply(instance, before)
@@ -103,6 +104,7 @@ def linearize(fmu, point=None, *, time=0.0, inputs=None, outputs=None, method=No
         instance._enter_continuous()
         linear = _at(instance, states, rates, at, chosen["inputs"], chosen["outputs"], method)
     finally:
+        instance._warn()
         instance.freeInstance()
     held = [v.name for v in description.modelVariables if v.causality == "output" and v.variability == "discrete" and v.type in _FLOATS]
     if sampled:

@@ -161,7 +161,9 @@ class Plan:
             names.append(self._name(name))
             values.append(str(_scalar(name, value)) if not isinstance(value, bool) else str(value).lower())
         output = None if self._output is None else [self._name(name) for name in self._output]
-        time, columns = self._core.simulate(names, values, output)
+        time, columns, texts = self._core.simulate(names, values, output)
+        for text in texts:
+            warnings.warn(text, stacklevel=2)
         columns = [(name.removeprefix(self._prefix), *more) for name, *more in columns]
         result = np.empty(len(time), [("time", float)] + [(name, values.dtype) for name, values, _ in columns])
         result["time"] = time
@@ -184,8 +186,16 @@ class Plan:
             a dictionary of arrays: `run`, the columns of the table, the measures, `end` (time reached, s) and, as the last,
             `error`; beside a measure of that name, `run.end` and `run.error`. A run that fails has NaN for its measures and one line
             as its error, otherwise "". Same bits for any number of threads. Enumerations have their names, in the table and in
-            measures of their values ("" where a run fails).
+            measures of their values ("" where a run fails). One Python warning counts the runs in which the FMUs warn: all are
+            asked, or every 16th of more than 1000.
         """
+        results, text = self._run_many(table, threads=threads, first_run=first_run, progress=progress)
+        if text:
+            warnings.warn(text, stacklevel=2)
+        return results
+
+    def _run_many(self, table, *, threads=None, first_run=0, progress=None):
+        """The results, and a sentence about warnings of the FMUs, if there are any."""
         columns = {str(name): column for name, column in _columns(table).items()}
         runs = columns.pop("run", None)
         for name in columns:
@@ -204,9 +214,10 @@ class Plan:
         if threads is not None and threads < 1:
             raise ValueError(f"threads must be at least 1, not {threads}")
         with _bar(progress, n) as advance:
-            measures, end, errors = self._core.run_many([self._name(name) for name in columns], values, threads or 0, advance)
+            names = [self._name(name) for name in columns]
+            measures, end, errors, text = self._core.run_many(names, values, runs, threads or 0, advance)
         results = [*self._named(dict(zip(columns, values))).values(), *map(_named, self._core.measure_items, measures)]
-        return dict(zip(self._columns(columns), [runs, *results, end, np.array(errors, dtype=object)]))
+        return dict(zip(self._columns(columns), [runs, *results, end, np.array(errors, dtype=object)])), text
 
     def gradient(self, at, *, step=1e-4, threads=None):
         """The measures and their derivatives with respect to variables, by central differences of runs, all in parallel.
@@ -235,10 +246,12 @@ class Plan:
         h = step * np.where(point == 0.0, 1.0, np.abs(point))
         if threads is not None and threads < 1:
             raise ValueError(f"threads must be at least 1, not {threads}")
-        measures, errors = self._core.run_around([self._name(name) for name in at], point, h, threads or 0)
+        measures, errors, text = self._core.run_around([self._name(name) for name in at], point, h, threads or 0)
         failed = [error for error in errors if error]
         if failed:
             raise FmuError(None, None, None, f"gradient: {failed[0]}")
+        if text:
+            warnings.warn(text, stacklevel=2)
         n = len(point)
         values = {name: float(runs[0]) for name, runs in zip(self.measures, measures)}
         slopes = {name: (runs[1 : n + 1] - runs[n + 1 :]) / (2.0 * h) for name, runs in zip(self.measures, measures)}

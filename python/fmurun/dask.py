@@ -61,7 +61,7 @@ def sweep(plan, rows, out, client, chunk=None):
     take = _rows_of(plan, table)
     # Errors that can be found before the first task: names, types, lengths.
     begin = time.perf_counter()
-    plan.run_many(take(0, 1), threads=1)
+    plan._run_many(take(0, 1), threads=1)
     seconds = time.perf_counter() - begin
     out = str(out).rstrip("/")
     fs, folder = fsspec.core.url_to_fs(out)
@@ -82,12 +82,14 @@ def sweep(plan, rows, out, client, chunk=None):
         _work, firsts, [min(chunk, count - f) for f in firsts], [tables[f] for f in firsts], plan=plan, out=out, key=keys,
         pure=False, retries=3,
     )  # fmt: skip
-    first_of = dict(zip(keys, firsts))
+    first_of, texts = dict(zip(keys, firsts)), []
     for future in as_completed(futures, raise_errors=False):
         first = first_of[future.key]
         try:
             # Not `status`: a worker that has died has lost the number, and `result` waits for another worker.
-            report["failed"] += future.result()
+            failed, text = future.result()
+            report["failed"] += failed
+            texts += [text] if text else []
             continue
         except KilledWorker:
             pass
@@ -100,6 +102,9 @@ def sweep(plan, rows, out, client, chunk=None):
         _write(fs, folder, first, results)
         report["isolated"] += 1
         report["failed"] += _failed(results)
+    if texts:
+        more = f"; other parts with warnings: {len(texts) - 1}" if len(texts) > 1 else ""
+        warnings.warn(f"{texts[0]}{more}", stacklevel=2)
     return report
 
 
@@ -166,15 +171,15 @@ def _write(fs, folder, first, results):
 
 
 def _work(first, count, table, plan, out):
-    """A part, on a worker; returns how many rows have an error. It returns no rows, so that none are lost with a worker."""
+    """A part, on a worker; returns how many rows have an error, and a warning. It returns no rows, so that none are lost with a worker."""
     fs, folder = fsspec.core.url_to_fs(out)
     if fs.exists(f"{folder}/{_part(first)}"):
         # Written by this sweep and requested again, because the worker that held the number died.
         with fs.open(f"{folder}/{_part(first)}", "rb") as part:
-            return sum(map(bool, pq.read_table(part).columns[-1].to_pylist()))
-    results = plan.run_many(plan.rows(first, count) if table is None else table, threads=1, first_run=first)
+            return sum(map(bool, pq.read_table(part).columns[-1].to_pylist())), None
+    results, text = plan._run_many(plan.rows(first, count) if table is None else table, threads=1, first_run=first)
     _write(fs, folder, first, results)
-    return _failed(results)
+    return _failed(results), text
 
 
 def _isolated(plan, table, first):
@@ -210,7 +215,7 @@ def _child(plan, pipe):
             row, number = pipe.recv()
         except EOFError:
             return
-        pipe.send(plan.run_many(row, threads=1, first_run=number))
+        pipe.send(plan._run_many(row, threads=1, first_run=number)[0])
 
 
 def _dead(plan, row, number, code):

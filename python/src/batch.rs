@@ -6,10 +6,13 @@ use crate::lane::{Common, Lane, Ports, renew};
 use fmu_import::threads;
 use numpy::ndarray::Array2;
 use numpy::{IntoPyArray, PyArray1, PyArray2, PyArrayMethods, PyReadonlyArray1, PyUntypedArrayMethods};
-use pyo3::exceptions::PyValueError;
+use pyo3::exceptions::{PyUserWarning, PyValueError};
 use pyo3::prelude::*;
 use pyo3::types::{PyBytes, PyDict};
+use std::collections::BTreeMap;
+use std::ffi::CString;
 use std::path::PathBuf;
+use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
 struct Lanes {
@@ -20,6 +23,8 @@ struct Lanes {
     /// Start values by variable, one for all lanes or one per lane.
     ports: Ports,
     values: Vec<Vec<f64>>,
+    /// Python has been told of a warning since the last initialization.
+    told: bool,
 }
 
 /// Start values from Python: names, and for each one value or one for each lane.
@@ -62,6 +67,7 @@ impl Lanes {
             let (names, values): (Vec<_>, Vec<_>) = start.into_iter().unzip();
             self.ports = Ports::find(&self.opened.fmu, &names)?;
             self.values = values;
+            self.told = false;
         }
         let all = renew(&mut self.opened, &mut self.all)?;
         let Self { all: lanes, common, opened, ports, values, .. } = self;
@@ -73,6 +79,21 @@ impl Lanes {
             lane.initialize(common, opened, ports, &row)?;
         }
         Ok(self.observe())
+    }
+
+    /// The first warning, once after each initialization.
+    fn news(&mut self) -> Option<String> {
+        if self.told || !self.common.news.swap(false, Ordering::Relaxed) {
+            return None;
+        }
+        let mut warnings = self.all.iter().filter_map(|lane| lane.warning.as_ref());
+        let first = warnings.next()?;
+        let text = match warnings.count() {
+            0 => first.clone(),
+            more => format!("{first}; and {more} of the other instances: `warned` has their warnings"),
+        };
+        self.told = true;
+        Some(text)
     }
 }
 
@@ -121,13 +142,15 @@ impl Batch {
                         .co_simulation
                         .as_ref()
                         .is_some_and(model_description::CoSimulation::can_get_and_set_state),
+                    news: AtomicBool::new(false),
                 };
                 let name = |k| {
                     if n == 1 { description.model_name.clone() } else { format!("{}[{k}]", description.model_name) }
                 };
-                let lanes = (0..n).map(|k| Lane::new(name(k))).collect();
+                let lanes = (0..n).map(|k| Lane::new(name(k), k % 16 == 0)).collect();
                 let ports = Ports::find(&opened.fmu, &[])?;
-                let mut lanes = Lanes { opened, common, all: lanes, threads, ports, values: Vec::new() };
+                let values = Vec::new();
+                let mut lanes = Lanes { opened, common, all: lanes, threads, ports, values, told: false };
                 lanes.reset(None, Some(start_values))?;
                 Ok(lanes)
             };
@@ -155,6 +178,7 @@ impl Batch {
                 return Err(PyValueError::new_err(format!("the mask must have {} elements", self.n)));
             }
             let observed = py.detach(|| self.lanes().reset(mask.as_deref(), start_values)).map_err(raise)?;
+            self.tell(py, 2)?;
             self.shaped(py, observed)
         })
     }
@@ -189,6 +213,7 @@ impl Batch {
             if let Some(error) = error {
                 return Err(raise(error));
             }
+            self.tell(py, 1)?;
             let Some(out) = out else { return self.shaped(py, observed) };
             let mut target = out.try_readwrite().map_err(|e| PyValueError::new_err(format!("out: {e}")))?;
             target.as_array_mut().iter_mut().zip(observed).for_each(|(x, y)| *x = y);
@@ -202,6 +227,13 @@ impl Batch {
             let observed = py.detach(|| self.lanes().observe());
             self.shaped(py, observed)
         })
+    }
+
+    /// The first warning of each instance that warned since its last initialization, by its number. Every 16th instance is asked in
+    /// all steps, the others only in the first after an initialization: looking for warnings takes time.
+    #[getter]
+    fn warned(&self) -> BTreeMap<usize, String> {
+        self.lanes().all.iter().enumerate().filter_map(|(k, lane)| Some((k, lane.warning.clone()?))).collect()
     }
 
     /// The errors of the instances that failed, by their number.
@@ -234,6 +266,13 @@ impl Batch {
 impl Batch {
     fn lanes(&self) -> MutexGuard<'_, Lanes> {
         self.lanes.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+
+    /// Gives the first warning to Python, for a caller this many frames above.
+    fn tell(&self, py: Python<'_>, frames: i32) -> PyResult<()> {
+        let Some(text) = self.lanes().news() else { return Ok(()) };
+        let text = CString::new(text.replace('\0', " ")).unwrap_or_default();
+        PyErr::warn(py, &py.get_type::<PyUserWarning>(), &text, frames)
     }
 
     fn lane<T: Send>(

@@ -1,9 +1,11 @@
 //! One instance of a batch: inputs in, a number of steps, outputs out.
 
 use crate::cache::{self, Opened};
-use fmu_import::{Error, FmuState, Instance, Values};
+use fmu_import::{Error, FmuState, Instance, Logging, Status, Values};
+use fmu_system::cosimulation::with_name;
 use model_description::BaseType;
 use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
 
 /// A scalar variable.
 #[derive(Clone, Debug)]
@@ -71,6 +73,8 @@ pub(crate) struct Common {
     pub(crate) step: f64,
     /// The FMU can save and set its state.
     pub(crate) states: bool,
+    /// A lane has a warning that Python has not been given.
+    pub(crate) news: AtomicBool,
 }
 
 /// One instance with its time.
@@ -83,11 +87,18 @@ pub(crate) struct Lane {
     steps: u32,
     /// The error that stops the lane until it is reset.
     pub(crate) error: Option<Error>,
+    /// The first warning since the last initialization.
+    pub(crate) warning: Option<String>,
+    /// The FMU is asked for warnings in all steps, otherwise only in the first after an initialization: looking for them can take a
+    /// third of a short step.
+    asks: bool,
+    /// The FMU is asked for warnings now.
+    asked: bool,
 }
 
 impl Lane {
-    pub(crate) fn new(name: String) -> Self {
-        Self { name, instance: None, initial: None, steps: 0, error: None }
+    pub(crate) fn new(name: String, asks: bool) -> Self {
+        Self { name, instance: None, initial: None, steps: 0, error: None, warning: None, asks, asked: false }
     }
 
     /// Initializes with these start values; replaces an instance that had an error.
@@ -110,14 +121,18 @@ impl Lane {
     }
 
     fn begin(&mut self, common: &Common, opened: &Arc<Opened>, ports: &Ports, values: &[f64]) -> Result<(), Error> {
-        let instance = match self.instance.take() {
-            Some(mut instance) => {
-                instance.reset()?;
-                self.instance.insert(instance)
-            }
-            None => self.instance.insert(opened.fmu.instantiate(&self.name, false)?),
+        let again = self.instance.take().map(|mut instance| {
+            instance.reset()?;
+            drop(instance.take_messages());
+            // A reset may end the logging. An FMU that refuses it gets a new instance.
+            Ok(instance.log_warnings(true).is_ok().then_some(instance))
+        });
+        let instance = match again.transpose()?.flatten() {
+            Some(instance) => instance,
+            None => opened.fmu.instantiate(&self.name, Logging::Warnings)?,
         };
-        self.steps = 0;
+        (self.steps, self.warning, self.asked) = (0, None, true);
+        let instance = self.instance.insert(instance);
         instance.setup(0.0, None)?;
         ports.write(instance, values)?;
         instance.enter_initialization()?;
@@ -125,7 +140,21 @@ impl Lane {
         if common.states {
             self.initial = Some(instance.get_state()?);
         }
+        self.listen(common);
         Ok(())
+    }
+
+    /// Keeps the first warning.
+    fn listen(&mut self, common: &Common) {
+        let Self { instance: Some(instance), warning, .. } = self else { return };
+        let mut messages = instance.take_messages().into_iter();
+        if warning.is_none() {
+            let first = messages.find(|message| message.status == Status::WARNING);
+            if let Some(message) = first {
+                *warning = Some(with_name(&self.name, message.text));
+                common.news.store(true, Ordering::Relaxed);
+            }
+        }
     }
 
     /// Returns to the last initialization; false if that needs [`initialize`](Self::initialize).
@@ -140,9 +169,10 @@ impl Lane {
 
     /// Writes the actions, steps and reads. An error stays in `error`, and the observations become NaN.
     pub(crate) fn advance(&mut self, common: &Common, actions: &[f64], repeat: u32, observations: &mut [f64]) {
-        let Self { instance: Some(instance), steps, error: None, .. } = self else {
+        let Self { instance: Some(instance), steps, error: None, asks, asked, .. } = self else {
             return observations.fill(f64::NAN);
         };
+        let heard = *asked;
         let mut work = || {
             common.actions.write(instance, actions)?;
             for _ in 0..repeat {
@@ -152,11 +182,18 @@ impl Lane {
                     return Err(usage(&self.name, "asked to end the simulation"));
                 }
             }
+            if *asked && !*asks {
+                *asked = false;
+                instance.log_warnings(false)?;
+            }
             common.observations.read(instance, observations)
         };
         if let Err(error) = work() {
             observations.fill(f64::NAN);
             self.error = Some(error);
+        }
+        if heard {
+            self.listen(common);
         }
     }
 

@@ -83,7 +83,7 @@ impl Plan {
         self.plan.notes().to_vec()
     }
 
-    /// Run once: time, and (name, values) of each recorded variable.
+    /// Run once: time, (name, values, unit) of each recorded variable, and the warnings of the FMUs.
     #[expect(clippy::type_complexity, clippy::needless_pass_by_value, reason = "Python's; PyO3 extracts values")]
     fn simulate<'py>(
         &self,
@@ -91,7 +91,7 @@ impl Plan {
         names: Vec<String>,
         values: Vec<String>,
         outputs: Option<Vec<String>>,
-    ) -> PyResult<(Bound<'py, PyArray1<f64>>, Vec<(String, Bound<'py, PyAny>, (String, f64, f64))>)> {
+    ) -> PyResult<(Bound<'py, PyArray1<f64>>, Vec<(String, Bound<'py, PyAny>, (String, f64, f64))>, Vec<String>)> {
         gate(|| {
             let run = || {
                 let set = self.plan.bind(names.iter().map(String::as_str))?;
@@ -99,7 +99,7 @@ impl Plan {
                 let set: Vec<_> = set.into_iter().zip(&values).map(number).collect::<Result<_, fmu_sweep::Error>>()?;
                 self.plan.simulate(&set, outputs.as_deref())
             };
-            let recording = py.detach(run).map_err(failed)?;
+            let (recording, warnings) = py.detach(run).map_err(failed)?;
             let columns = recording.columns.into_iter().map(|c| {
                 let values = if c.exact.is_empty() { array(py, &c.values) } else { integers(py, &c.exact) };
                 let shown = match &c.display {
@@ -109,34 +109,44 @@ impl Plan {
                 Ok((c.name, values?, shown))
             });
             let columns = columns.collect::<PyResult<_>>()?;
-            Ok((recording.time.into_pyarray(py), columns))
+            Ok((recording.time.into_pyarray(py), columns, warnings))
         })
     }
 
-    /// Run rows: columns of the measures, times reached, errors. 0 threads means all cores.
-    #[expect(clippy::type_complexity, clippy::needless_pass_by_value, reason = "Python's; PyO3 extracts values")]
+    /// Run rows, known by the numbers `runs`: columns of the measures, times reached, errors, a sentence about warnings of the FMUs. 0
+    /// threads means all cores.
+    #[expect(
+        clippy::type_complexity,
+        clippy::too_many_arguments,
+        clippy::needless_pass_by_value,
+        reason = "Python's arguments and result; PyO3 extracts values"
+    )]
     fn run_many<'py>(
         &self,
         py: Python<'py>,
         names: Vec<String>,
         columns: Vec<Given<'py>>,
+        runs: PyReadonlyArray1<'py, i64>,
         threads: usize,
         progress: Option<Py<PyAny>>,
-    ) -> PyResult<(Vec<Bound<'py, PyAny>>, Bound<'py, PyArray1<f64>>, Vec<String>)> {
+    ) -> PyResult<(Vec<Bound<'py, PyAny>>, Bound<'py, PyArray1<f64>>, Vec<String>, Option<String>)> {
         gate(|| {
+            let runs = runs.as_array().to_vec();
             // Copies: another thread may write the arrays once Python's lock is released.
             let columns: Vec<Vec<Number>> = columns.iter().map(Given::numbers).collect();
             let variables = self.plan.bind(names.iter().map(String::as_str)).map_err(failed)?;
             let threads = if threads == 0 { fmu_sweep::threads_here() } else { threads };
             let columns: Vec<&[Number]> = columns.iter().map(Vec::as_slice).collect();
             let run = |go_on: &GoOn<'_>| self.plan.run_many(&variables, &columns, threads, go_on);
-            let RunResults { measures, end, errors } = py.detach(|| attended(run, progress.as_ref()))?;
+            let RunResults { measures, end, errors, warned } = py.detach(|| attended(run, progress.as_ref()))?;
             let measures = measures.iter().map(|x| integers(py, x)).collect::<PyResult<_>>()?;
-            Ok((measures, end.into_pyarray(py), errors.into_iter().map(Option::unwrap_or_default).collect()))
+            let errors = errors.into_iter().map(Option::unwrap_or_default).collect();
+            let number = |row| usize::try_from(row).ok().and_then(|row| runs.get(row)).copied().unwrap_or_default();
+            Ok((measures, end.into_pyarray(py), errors, warned.sentence(runs.len() as u64, number)))
         })
     }
 
-    /// Runs at a point, then with each variable increased by its step, then decreased: columns of the measures, and errors.
+    /// Runs at a point, then with each variable increased by its step, then decreased: columns of the measures, errors, and a warning.
     #[expect(clippy::type_complexity, clippy::needless_pass_by_value, reason = "Python's; PyO3 extracts values")]
     fn run_around<'py>(
         &self,
@@ -145,15 +155,16 @@ impl Plan {
         point: Vec<f64>,
         steps: Vec<f64>,
         threads: usize,
-    ) -> PyResult<(Vec<Bound<'py, PyArray1<f64>>>, Vec<String>)> {
+    ) -> PyResult<(Vec<Bound<'py, PyArray1<f64>>>, Vec<String>, Option<String>)> {
         gate(|| {
             let variables = self.plan.bind(names.iter().map(String::as_str)).map_err(failed)?;
             let threads = if threads == 0 { fmu_sweep::threads_here() } else { threads };
             let run = |go_on: &GoOn<'_>| self.plan.run_around(&variables, &point, &steps, threads, go_on);
-            let RunResults { measures, errors, .. } = py.detach(|| attended(run, None))?;
+            let RunResults { measures, errors, warned, .. } = py.detach(|| attended(run, None))?;
             let reals = |x: Vec<Number>| x.into_iter().map(Number::real).collect::<Vec<f64>>().into_pyarray(py);
             let measures = measures.into_iter().map(reals).collect();
-            Ok((measures, errors.into_iter().map(Option::unwrap_or_default).collect()))
+            let errors = errors.into_iter().map(Option::unwrap_or_default).collect();
+            Ok((measures, errors, warned.first.map(|(_, text)| text)))
         })
     }
 

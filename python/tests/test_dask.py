@@ -139,6 +139,12 @@ def test_a_poison_row_ends_as_a_row(archives, client, tmp_path):
         assert np.isnan(results[name][~good]).all()
 
 
+def test_warnings_of_the_workers_come_back(archives, client, tmp_path):
+    rows = {"controller.motor.R_s": [1.8, 1.8, 1.8, 18.0, 18.0, 1.8]}
+    with pytest.warns(UserWarning, match=r"1 of 2 rows have warnings; the first, in row [34]: .*; other parts with warnings: 1"):
+        sweep(drive(archives), rows, tmp_path, client, chunk=2)
+
+
 def test_another_plan_or_table_is_refused(archives, client, tmp_path):
     sweep(drive(archives), table(20), tmp_path, client)
     with pytest.raises(FmuError, match="has the parts of another plan or table"):

@@ -5,7 +5,7 @@ use cargo_fmu::message;
 use clap::Args;
 use fmu_import::whole;
 use fmu_sweep::isolate::Isolation;
-use fmu_sweep::{Options, Progress, Report, Sweep as Definition, Warned, threads_here};
+use fmu_sweep::{Options, Progress, Report, Sweep as Definition, threads_here};
 use indicatif::{ProgressBar, ProgressStyle};
 use std::fs::File;
 use std::io::{self, IsTerminal};
@@ -85,10 +85,8 @@ pub fn run(args: &Sweep) -> Result<bool> {
 
 fn report(report: &Report, sweep: &Definition, args: &Sweep) -> Result<bool> {
     let Report { rows, missing, results, failures, warned } = report;
-    if let Some((row, warning)) = &warned.first {
-        let Warned { asked, count, .. } = warned;
-        let of = if asked == rows { format!("{rows} rows") } else { format!("the {asked} checked rows") };
-        message::warning(&format!("{count} of {of} have warnings; the first, in row {row}: {warning}"));
+    if let Some(text) = warned.sentence(*rows, |row| row) {
+        message::warning(&text);
     }
     for (row, error) in &failures.first {
         eprintln!("row {row}: {error}");

@@ -511,7 +511,7 @@ impl SensorlessController {
             log.warn("tau_ref", || clipped(asked, limits));
         }
         if !par.speed_loop.torque_mode {
-            self.state.overload.warn([out.speed_est, self.state.w_ref], || limits, log);
+            self.state.overload.warn(true, [out.speed_est, self.state.w_ref], || limits, log);
         }
         if let Some(time) = self.state.stands.reached(par) {
             log.warn("stands", || stands::hidden(par, asked, out.speed_est, time));

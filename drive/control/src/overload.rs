@@ -106,22 +106,35 @@ impl Overload {
         !self.is && self.same == 2 && self.last > short(0.02 * speed_ref.abs() + 0.5)
     }
 
-    /// Reports what has been found, with the speed (rad/s), its reference (rad/s) and the limits of the torque (N.m).
-    pub fn warn(&self, [speed, speed_ref]: [f64; 2], limits: impl FnOnce() -> [f64; 2], log: &mut Warnings<'_>) {
+    /// Reports what has been found, with the speed (rad/s), which may be `estimated`, its reference (rad/s) and the limits of the
+    /// torque (N.m).
+    pub fn warn(
+        &self,
+        estimated: bool,
+        [speed, speed_ref]: [f64; 2],
+        limits: impl FnOnce() -> [f64; 2],
+        log: &mut Warnings<'_>,
+    ) {
+        let name = if estimated { "speed_est" } else { "the speed" };
         if self.runs_away() {
             let [low, high] = limits();
             log.warn("overload", || {
+                let (or, and) = if estimated {
+                    (", or the estimate is wrong", ", and check the controller's data of the machine")
+                } else {
+                    ("", "")
+                };
                 format!(
-                    "the load exceeds the torque of the drive: at tau_min = {low:.4} N.m and tau_max = {high:.4} N.m, the speed runs away \
+                    "the load exceeds the torque of the drive{or}: at tau_min = {low:.4} N.m and tau_max = {high:.4} N.m, {name} runs away \
                      from speed_ref = {speed_ref} rad/s and is {speed:.1} rad/s; lower the load, check that it is in N.m, or raise the \
-                     limits of the drive's current and torque"
+                     limits of the drive's current and torque{and}"
                 )
             });
         } else if self.stays(speed_ref) {
             let [low, high] = limits();
             log.warn("speed_ref", || {
                 format!(
-                    "speed_ref = {speed_ref} rad/s is not reached: for more than 1 s, the speed has stayed at {speed:.1} rad/s, with the torque at \
+                    "speed_ref = {speed_ref} rad/s is not reached: for more than 1 s, {name} has stayed at {speed:.1} rad/s, with the torque at \
                      its limit, tau_min = {low:.4} N.m or tau_max = {high:.4} N.m, or the voltage at that of the link; check that speed_ref is \
                      in rad/s, lower the load, raise u_dc or the limits of current and torque, or use field weakening"
                 )

@@ -67,6 +67,8 @@ pub struct FrequencyPoint {
     pub unsettled: f64,
     /// Relative change of the values with half the communication step; `None` if the FMUs do not allow it.
     pub stepped: Option<f64>,
+    /// The first warning of the FMUs.
+    pub warning: Option<String>,
 }
 
 /// Relative changes above which a value is doubtful: 2 % are 0.2 dB or 1.1 degrees. The extrapolation leaves about the square of
@@ -77,7 +79,7 @@ pub const DOUBTFUL: f64 = 0.02;
 pub const COARSE: f64 = 0.3;
 
 impl FrequencyPoint {
-    /// Why the values are doubtful.
+    /// Why the values are doubtful; a warning of the FMUs is last.
     pub fn doubts(&self) -> Vec<String> {
         let percent = |x: f64| format!("{:.1} %", 100.0 * x);
         let mut found = Vec::new();
@@ -90,6 +92,7 @@ impl FrequencyPoint {
         if let Some(x) = self.stepped.filter(|x| x.is_nan() || *x > COARSE) {
             found.push(format!("changes by {} with half the communication step", percent(x)));
         }
+        found.extend(self.warning.clone());
         found
     }
 }
@@ -146,6 +149,7 @@ struct Measured {
     values: Vec<Complex64>,
     unsettled: f64,
     watched: Vec<f64>,
+    warning: Option<String>,
 }
 
 /// Common settings of all measurements.
@@ -326,7 +330,7 @@ impl Sweep<'_> {
             }
         }
         let half = any.then(|| measure(amplitude, 2 * fine)).transpose()?;
-        let Measured { values, mut unsettled, mut watched } = found;
+        let Measured { values, mut unsettled, mut watched, warning } = found;
         let stepped = half.as_ref().map(|half| apart(&values, &half.values, &vec![0.0; values.len()]));
         let values = match half {
             Some(half) => {
@@ -336,7 +340,8 @@ impl Sweep<'_> {
             }
             None => values,
         };
-        Ok(FrequencyPoint { frequency: tone.frequency(), amplitude, values, watched, nonlinear, unsettled, stepped })
+        let frequency = tone.frequency();
+        Ok(FrequencyPoint { frequency, amplitude, values, watched, nonlinear, unsettled, stepped, warning })
     }
 
     /// Measures with `fine` communication steps in each of the plan.
@@ -368,7 +373,9 @@ impl Sweep<'_> {
         let (mut fits, mut last) = (vec![SineFit::default(); watched], None::<Vec<SineFit>>);
         let mut largest = vec![0.0_f64; signals - watched];
         let (mut values, mut unsettled, mut windows) = (Vec::new(), f64::INFINITY, 0_u32);
-        plan.worker()?
+        let mut worker = plan.worker()?;
+        worker.hear(true);
+        worker
             .run([] as [(&_, f64); 0], |time, row| {
                 journal::reached(time);
                 let at = point;
@@ -406,7 +413,9 @@ impl Sweep<'_> {
             .and_then(|ended| match ended.by {
                 Some(name) => invalid(format!("{name} ended the simulation at {} s", ended.time)),
                 None if values.iter().any(|x| !x.is_finite()) => invalid("a measured variable is not finite"),
-                None => Ok(Measured { values, unsettled, watched: largest }),
+                None => {
+                    Ok(Measured { values, unsettled, watched: largest, warning: worker.warnings().into_iter().next() })
+                }
             })
     }
 }
@@ -427,6 +436,7 @@ mod tests {
                 nonlinear: 0.0,
                 unsettled: 0.0,
                 stepped: None,
+                warning: None,
             };
             (f, Ok(point))
         };

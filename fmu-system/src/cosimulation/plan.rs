@@ -398,14 +398,19 @@ impl Worker {
         self.hears = hears;
     }
 
-    /// The first warning of the last run, with the name of the instance; none if the FMUs were not asked, because some warn unasked.
-    pub fn warning(&self) -> Option<String> {
-        if !self.heard {
-            return None;
+    /// The different warnings of the last run, with the names of the instances; none if the FMUs were not asked, because some warn
+    /// unasked.
+    pub fn warnings(&self) -> Vec<String> {
+        let mut all: Vec<String> = Vec::new();
+        if self.heard {
+            for (name, message) in take_messages(&self.instances) {
+                let text = with_name(&name, message.text);
+                if message.status == Status::WARNING && !all.contains(&text) {
+                    all.push(text);
+                }
+            }
         }
-        let mut all = take_messages(&self.instances).into_iter();
-        let (name, message) = all.find(|(_, message)| message.status == Status::WARNING)?;
-        Some(with_name(&name, message.text))
+        all
     }
 
     /// Creates new instances, for an FMU whose reset is incomplete.
