@@ -60,16 +60,3 @@ impl SpeedWatch {
         self.unsettled.warn(bandwidths, log);
     }
 }
-
-/// A message about bandwidths (rad/s) of the torque and of the speed loop in the wrong order.
-///
-/// At the crossover of the speed loop the lag of the torque takes 45 deg of the phase if both are equal, and with `t_is` = 4 nothing is
-/// left if the torque has a quarter of the bandwidth.
-pub(crate) fn order([torque, speed]: [f64; 2]) -> Option<String> {
-    (speed > torque).then(|| {
-        format!(
-            "speed_loop.bandwidth = {speed} rad/s is above current.bandwidth = {torque} rad/s: the torque follows too slowly, and the speed \
-             overshoots or oscillates; make current.bandwidth at least four times as large"
-        )
-    })
-}

@@ -26,6 +26,7 @@ mod parameters;
 mod protection;
 #[path = "../control/tests/random_machines/mod.rs"]
 mod random_machines;
+mod saturated;
 mod saturation;
 mod sensors;
 mod short_circuit;

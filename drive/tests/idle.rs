@@ -156,7 +156,7 @@ fn what_is_reported_has_no_effect() {
     assert!(wrong.is_empty() && tried > 1000, "have an effect: {wrong:#?}");
 }
 
-/// `PmsmDriveMean` reports once that the gates cannot hold the speed; with the gates off, its diodes feed the link.
+/// `PmsmDriveMean` reports once that its current loop cannot hold the current; with the gates off, its diodes feed the link.
 #[test]
 fn a_drive_that_cannot_be_is_named_once() {
     for enable in [true, false] {
@@ -174,8 +174,13 @@ fn a_drive_that_cannot_be_is_named_once() {
             block.model.warn(&mut Warnings::to(&mut |(_, key, text)| all.push((k, key, text()))));
         }
         if enable {
-            let named: Vec<_> = all.iter().filter(|(_, key, _)| *key == "u_share").collect();
-            assert!(named.len() == 1 && named[0].0 == 10 && named[0].2.contains("the diodes would conduct"), "{all:?}");
+            let named: Vec<_> = all.iter().filter(|(_, key, _)| *key == "limit.i").collect();
+            assert!(
+                named.len() == 1
+                    && named[0].0 == 10
+                    && named[0].2.contains("A exceeds limit.i = 7.5 A, because at 2000.0 rad/s"),
+                "{all:?}"
+            );
         } else {
             assert!(all.is_empty() && block.out.drive.plant.powers.p_in < -1e3, "{all:?}");
         }

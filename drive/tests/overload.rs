@@ -220,3 +220,20 @@ fn a_rotor_that_the_controller_believes_to_have_is_reported() {
         }
     }
 }
+
+/// A drive that is lost because its torque follows more slowly than the speed loop asks is told so, not that its machine's data are wrong.
+#[test]
+fn a_current_loop_slower_than_the_speed_loop_is_named() {
+    for estimator in [Kind::Rasmussen, Kind::Sensored] {
+        let said = |bandwidth: f64, key| {
+            let mut block = Block::<PmsmDrive>::default();
+            let par = &mut block.model.pair.controller.model.parameters;
+            (par.estimator, par.current.bandwidth) = (estimator, bandwidth);
+            message(key, block, 0.5, |m, speed, tau| (m.inputs.speed_ref, m.inputs.tau_load) = (speed, tau))
+        };
+        let text = said(10.0, "bandwidth").expect("a message");
+        assert!(text.starts_with("speed_loop.bandwidth = 80 rad/s is above current.bandwidth = 10 rad/s"), "{text}");
+        assert_eq!(said(10.0, "lock_lost"), None, "{estimator:?}");
+        assert_eq!(said(400.0, "bandwidth"), None, "{estimator:?}");
+    }
+}

@@ -27,7 +27,7 @@ pub fn cost(drive: &Steady, [speed, torque]: [f64; 2], u_dc: f64, T: f64) -> Opt
         return None;
     }
     let at = sheet::at(drive, speed, u_dc, T);
-    let now = at.by_shaft(torque).filter(sheet::is_reached)?;
+    let now = at.by_shaft(torque).filter(|point| drive.fits(point))?;
     let share = now.u_share.max(drive.controller.weakening.k_u);
     let angle = |k: u32| std::f64::consts::PI * (0.25 + 0.75 * f64::from(k) / f64::from(DIRECTIONS));
     let points = (0..=DIRECTIONS).filter_map(|k| with_torque(&at, torque, angle(k), drive.controller.limit.i));

@@ -239,7 +239,7 @@ impl Map {
         let exact = cycle.energy(|speed, tau| {
             let at = sheet::at(&self.drive, speed, u_dc, T);
             let least = sheet::ends(&at)[0].map_or(0.0, |point| point.powers.tau_shaft);
-            let point = at.by_shaft(tau.max(least)).filter(sheet::is_reached)?;
+            let point = at.by_shaft(tau.max(least)).filter(|point| at.fits(point))?;
             Some((point.powers.p_in, point.powers.losses))
         })?;
         let table = self.table(sheet);

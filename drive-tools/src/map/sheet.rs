@@ -8,9 +8,6 @@ use crate::queue;
 use drive::plant::thermal::Temperatures;
 use drive::steady::{At, Condition, Point, Region, Steady};
 
-/// Maximum share of u_dc / sqrt 3 of a drive that settles.
-const FULL: f64 = 1.0 + 1e-6;
-
 /// The grid.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Axes {
@@ -53,15 +50,10 @@ pub fn at(drive: &Steady, speed: f64, u_dc: f64, T: f64) -> At<'_> {
     drive.at(&Condition { speed, u_dc, temperatures: Temperatures::all(T) })
 }
 
-/// Whether the link has the voltage of the point.
-pub fn is_reached(point: &Point) -> bool {
-    point.u_share <= FULL
-}
-
 /// The points of minimum and maximum torque at the shaft, if the voltage allows a torque of that sign.
 pub fn ends(at: &At<'_>) -> [Option<Point>; 2] {
     let [low, high] = at.ends();
-    let reached = |point: &Point, sign: f64| is_reached(point) && sign * point.powers.tau_shaft > 0.0;
+    let reached = |point: &Point, sign: f64| at.fits(point) && sign * point.powers.tau_shaft > 0.0;
     [Some(low).filter(|p| reached(p, -1.0)), Some(high).filter(|p| reached(p, 1.0))]
 }
 
@@ -80,7 +72,7 @@ fn column(drive: &Steady, x: &[f64], speed: f64, u_dc: f64, T: f64) -> Column {
             return end;
         }
         let tau = if x == 0.0 { 0.0 } else { x.abs() * end?.powers.tau_shaft };
-        at.by_shaft(tau).filter(is_reached)
+        at.by_shaft(tau).filter(|point| at.fits(point))
     };
     Column { points: x.iter().map(point).collect(), ends }
 }

@@ -41,7 +41,7 @@ enumeration! {
     #[derive(Default, Serialize, Deserialize)]
     pub enum ModulationMode("ModulationMode", "Voltage beyond u_dc/sqrt(3)") {
         #[default]
-        1 Linear "Sinusoidal up to u_dc/sqrt(3), the most that the drive uses in steady state";
+        1 Linear "Sinusoidal up to u_dc/sqrt(3), the most that field weakening uses";
         2 MinimumPhase "Overmodulation with the angle of the reference, fundamental up to 0.6057 u_dc";
         3 MinimumMagnitude "Overmodulation to the nearest point of the hexagon, fundamental up to 2/pi u_dc";
         4 SixStep "Overmodulation with the magnitude of the reference, up to six-step, fundamental up to 2/pi u_dc";
@@ -156,6 +156,21 @@ impl ModulationMode {
         let reference = edge / (magnitude * self.inverse(magnitude / u_dc));
         let limited = (magnitude > MARGIN * most).then(|| u * (MARGIN * most / magnitude));
         Applied { u: self.limit(Phases::from_stator(u * reference), u_dc), limited }
+    }
+
+    /// The fundamental F in units of u_dc / sqrt 3 of a turning request from which the modulator cuts off mu F. With
+    /// [`Linear`](Self::Linear), which limits the request as minimum phase error does, F grows with mu; the others keep it until they reach
+    /// their maximum.
+    pub fn cut(self, mu: f64) -> f64 {
+        if self != Self::Linear {
+            return self.reach();
+        }
+        // r = (1 + mu) F between two points of the curve.
+        let mu_of = |[F, q]: [f64; 2]| INVERSE_SQRT_3 / (q * F) - 1.0;
+        let above = MINIMUM_PHASE.partition_point(|&point| mu_of(point) < mu).clamp(1, POINTS - 1);
+        let [low, high] = [MINIMUM_PHASE[above - 1], MINIMUM_PHASE[above]];
+        let share = ((mu - mu_of(low)) / (mu_of(high) - mu_of(low))).clamp(0.0, 1.0);
+        SQRT_3 * (low[0] + share * (high[0] - low[0]))
     }
 
     /// u_dc / (sqrt 3 r) of the reference r for the fundamental `F` (in units of u_dc), by straight lines between exact points.

@@ -79,6 +79,11 @@ impl CurrentGains {
             R: if par.reference_feed_forward { motor.R_s } else { 0.0 },
         }
     }
+
+    /// Proportional gains of both axes in V/A.
+    pub fn proportional(&self) -> [f64; 2] {
+        [self.d.k_p, self.q.k_p]
+    }
 }
 
 /// Maximum product of the gain that acts on an error and T_s / L with the lower inductance, in a frame off the rotor: with one sample

@@ -12,6 +12,7 @@ use crate::one_shunt::OneShunt;
 use crate::position::{Position, PositionSensor};
 use crate::sensor::MeasuredPhases;
 use crate::signals::{ControllerInputs, ControllerOutputs};
+use crate::speed;
 use crate::stands;
 use crate::start::StartMode;
 use crate::state::{InUse, State, context};
@@ -539,6 +540,10 @@ impl SensorlessController {
                 )
             });
             return;
+        }
+        let order = speed::order([par.current.bandwidth, par.speed_loop.bandwidth]);
+        if let Some(why) = order.filter(|_| !par.speed_loop.torque_mode) {
+            return log.warn("bandwidth", || why.clone());
         }
         let Motor { n_p, R_s, L_d, L_q, psi_M } = self.parameters.motor;
         // A wrong resistance changes the voltage by at most R_s i, which is outweighed by a back EMF or a mismatch of twice that; a dead

@@ -33,6 +33,11 @@ impl Settled {
         (&self.gains.speed, self.gains.k)
     }
 
+    /// Proportional gains of the current loop in V/A.
+    pub fn current_loop(&self) -> [f64; 2] {
+        self.gains.current.proportional()
+    }
+
     /// The references at the mechanical `speed` (rad/s) on a DC link of `u_dc` (V), with the trim `trim` (V) of field weakening;
     /// `par` are the parameters of [`new`](Self::new),
     /// `derating` is the share of the full torque.

@@ -182,6 +182,19 @@ pub const SPEED_LOOP: &Table<SpeedLoop> = table![
     ),
 ];
 
+/// A message about bandwidths (rad/s) of the torque and of the speed loop in the wrong order.
+///
+/// At the crossover of the speed loop the lag of the torque takes 45 deg of the phase if both are equal, and with `t_is` = 4 nothing is
+/// left if the torque has a quarter of the bandwidth.
+pub fn order([torque, speed]: [f64; 2]) -> Option<String> {
+    (speed > torque).then(|| {
+        format!(
+            "speed_loop.bandwidth = {speed} rad/s is above current.bandwidth = {torque} rad/s: the torque follows too slowly, and the speed \
+             overshoots or oscillates; make current.bandwidth at least four times as large"
+        )
+    })
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;

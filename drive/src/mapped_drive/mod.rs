@@ -28,11 +28,12 @@ mod state;
 pub use state::{MappedDrive, MappedInputs, MappedOutputs, MappedShaft};
 
 use crate::happened::Happened;
-use crate::speed_watch::{self, SpeedWatch, Watched};
+use crate::speed_watch::{SpeedWatch, Watched};
 use drive_base::math::all_finite;
 use drive_control::idle::NO_VOLTAGE;
 use drive_control::model::clipped;
 use drive_control::overload::Overload;
+use drive_control::speed;
 use drive_control::speed::SPEED_LOOP;
 use drive_plant::power::{ENERGY, Energy};
 use fmu_core::idle::{Acts, why};
@@ -195,7 +196,7 @@ impl Warns for MappedDrive {
         let bandwidths = [self.bandwidth, self.speed_loop.bandwidth];
         self.watch.warn([speed, self.state.speed_ref], bandwidths, || self.point(&self.state).limits, log);
         if self.first == Happened::Now {
-            let order = speed_watch::order(bandwidths).filter(|_| !self.speed_loop.torque_mode && !self.shaft.imposed);
+            let order = speed::order(bandwidths).filter(|_| !self.speed_loop.torque_mode && !self.shaft.imposed);
             for (key, message) in [("map.p_loss", self.map.doubt()), ("bandwidth", order)] {
                 if let Some(message) = message {
                     log.warn(key, || message.clone());

@@ -27,7 +27,7 @@ impl PmsmDriveMean {
     /// after these `diodes` while they are off.
     pub(super) fn point_of(&self, at: &At<'_>, (tau, diodes): (f64, Diodes)) -> Point {
         match self.bridge() {
-            Gates::Switch => at.by_reference(tau),
+            Gates::Switch => at.by_loop(tau),
             Gates::Short => at.shorted(),
             Gates::Off => at.off(diodes),
         }
@@ -44,7 +44,7 @@ impl PmsmDriveMean {
     /// Model Exchange, at an event in this `state`: where the gates have just been switched off, the current flows on from there.
     pub(super) fn leave(&mut self, state: &State) {
         if let (Diodes::Open(_), Gates::Off) = (self.diodes, self.bridge()) {
-            let before = self.at(state, &self.point).by_reference(state.tau);
+            let before = self.at(state, &self.point).by_loop(state.tau);
             self.diodes = Diodes::Open(before.psi);
         }
     }

@@ -39,7 +39,7 @@ use crate::happened::Happened;
 use crate::idle;
 use crate::pmsm_drive::{DriveInputs, DriveOutputs, INPUTS, OUTPUTS, in_part};
 use crate::rules::same_pole_pairs;
-use crate::speed_watch::{self, SpeedWatch, Watched};
+use crate::speed_watch::{SpeedWatch, Watched};
 use crate::steady::{At, Condition, Diodes, Point, Steady, check_saturation};
 use crate::torque::{TORQUE, TorqueAt, TorqueParameters};
 use drive_base::frame::Dq;
@@ -49,6 +49,7 @@ use drive_control::model::clipped;
 use drive_control::modes::Follows;
 use drive_control::overload::Overload;
 use drive_control::signals::ControllerOutputs;
+use drive_control::speed;
 use drive_control::tables::{self as control, ControllerParameters};
 use drive_control::trip::{Cause, Trip};
 use drive_plant::PmsmPlant;
@@ -105,7 +106,7 @@ pub struct PmsmDriveMean {
     held: ControllerOutputs,
     /// The first step, after which the data are compared.
     first: Happened,
-    /// Whether no drive can operate like this.
+    /// Whether the source cannot supply the power, or the loop cannot hold the current.
     impossible: Happened,
     /// Time in s for which the torque reference has exceeded its limits.
     clipped_for: f64,
@@ -181,8 +182,8 @@ pub struct MeanOutputs {
     pub psi: Dq,
 }
 
-/// Share of u_dc / sqrt 3 above which a voltage exceeds the link.
-const FULL: f64 = 1.0 + 1e-6;
+/// Share of `limit.i` above which the current is not held.
+const HELD: f64 = 1.001;
 
 /// Remedy for impossible temperatures.
 const REMEDY: &str = "the network became too hot; reduce the torque, or raise thermal.G_ws and thermal.G_sc";
@@ -334,7 +335,7 @@ impl Model for PmsmDriveMean {
 
     const ICON: Option<&'static str> = Some(include_str!("../../icons/pmsm_drive.svg"));
 
-    const STATE_VERSION: u16 = 13;
+    const STATE_VERSION: u16 = 14;
 
     const CONTINUOUS: bool = true;
 
@@ -473,14 +474,14 @@ impl PmsmDriveMean {
         Fault::new(format!("the drive's state is no longer finite after a step of {h} s{cause}"))
     }
 
-    /// Whether no drive can operate like this: no current fits the voltage of the link, or its source cannot supply the power.
+    /// Whether the source of the link cannot supply the power, or the current loop cannot hold the current, because the EMF exceeds the
+    /// voltage of the link.
     fn is_impossible(&self) -> bool {
-        let p_in = self.point.powers.p_in;
-        let u_dc = self.voltage(p_in);
-        if self.linked() && self.link(p_in).overloaded {
-            return true;
-        }
-        self.gates() && u_dc > 0.0 && self.point.u_share > FULL
+        self.is_overloaded() || self.gates() && self.point.i.magnitude() > HELD * self.drive.controller.limit.i
+    }
+
+    fn is_overloaded(&self) -> bool {
+        self.linked() && self.link(self.point.powers.p_in).overloaded
     }
 }
 
@@ -496,15 +497,15 @@ impl Warns for PmsmDriveMean {
         }
         if self.impossible == Happened::Now {
             let p_in = self.point.powers.p_in;
-            let (speed, u_share, u_dc) = (self.speed(&self.state), self.point.u_share, self.voltage(p_in));
-            if self.linked() && self.link(p_in).overloaded {
+            if self.is_overloaded() {
                 return log.warn("u_cap", || self.link_parameters.lack(self.inputs.u_dc, p_in));
             }
-            log.warn("u_share", || {
+            let (speed, i, limit) = (self.speed(&self.state), self.point.i.magnitude(), self.drive.controller.limit.i);
+            let u_dc = self.voltage(p_in);
+            log.warn("limit.i", || {
                 format!(
-                    "no current fits u_dc = {u_dc} V (u_share = {u_share:.3}) at {speed} rad/s: the diodes would conduct and the \
-                     machine feed the link. With the gates on, PmsmDriveMean does not model this, and its outputs are not those \
-                     of a drive; use PmsmDrive, or set enable to false there"
+                    "the current loop does not hold the current: {i:.1} A exceeds limit.i = {limit} A, because at {speed:.1} rad/s the EMF \
+                     exceeds what the link of u_dc = {u_dc:.1} V can oppose; use field weakening, a lower speed or a higher voltage"
                 )
             });
         }
@@ -519,7 +520,7 @@ impl Warns for PmsmDriveMean {
         let plant = &self.drive.plant;
         if self.first == Happened::Now {
             let drops = apart::drops(&plant.inverter.devices, self.drive.controller.limit.i, self.inputs.u_dc);
-            let order = speed_watch::order(bandwidths).filter(|_| !self.torque_mode() && !plant.mechanics.imposed);
+            let order = speed::order(bandwidths).filter(|_| !self.torque_mode() && !plant.mechanics.imposed);
             let apart = apart::message(plant, &self.drive.controller);
             for (key, message) in [("apart", apart), ("devices", drops), ("bandwidth", order)] {
                 if let Some(message) = message {

@@ -66,7 +66,7 @@ impl PmsmDriveMean {
             i_ref: parts,
             lock_lost: 0.0,
             enabled,
-            voltage_limited: enabled && tau_ref.abs() < wanted - 1e-9 * highest,
+            voltage_limited: enabled && (tau_ref.abs() < wanted - 1e-9 * highest || !self.drive.fits(point)),
             current_limited: enabled && matches!(region, Region::Limit | Region::Mtpv),
             tau_max,
             tau_min,

@@ -56,9 +56,9 @@ pub struct Point {
     pub psi: Dq,
     /// Voltage at the terminals of the machine in V.
     pub u: Dq,
-    /// Magnitude in V of the voltage requested by the current loop, including the drop of the devices.
-    pub requested: f64,
-    /// `requested` as a share of u_dc / sqrt 3; 0 without a link voltage.
+    /// Voltage in V requested by the current loop, including the drop of the devices.
+    pub requested: Dq,
+    /// The magnitude of `requested` as a share of u_dc / sqrt 3; 0 without a link voltage.
     pub u_share: f64,
     /// Electromagnetic torque in N.m.
     pub tau_e: f64,
@@ -141,9 +141,14 @@ impl<'a> At<'a> {
         self.settled.limits()
     }
 
-    /// Maximum fundamental voltage in V.
+    /// Maximum fundamental voltage in V of `modulation.mode`.
     pub(super) fn highest(&self) -> f64 {
-        self.condition.u_dc / SQRT_3 * self.drive.controller.modulation.mode.reach()
+        self.full(self.drive.controller.modulation.mode.reach())
+    }
+
+    /// This share of u_dc / sqrt 3 in V.
+    pub(super) fn full(&self, share: f64) -> f64 {
+        self.condition.u_dc / SQRT_3 * share
     }
 
     /// This condition, with the trim `trim` (V) of field weakening.
@@ -159,7 +164,7 @@ impl<'a> At<'a> {
     #[inline]
     pub fn by_reference(&self, tau: f64) -> Point {
         let point = self.of_reference(tau);
-        if point.requested > self.allowed() { self.within_voltage(tau, point) } else { point }
+        if point.requested.magnitude() > self.allowed() { self.within_voltage(tau, point) } else { point }
     }
 
     /// The points of minimum and maximum torque.
@@ -173,8 +178,7 @@ impl<'a> At<'a> {
         let limits = self.settled.limits();
         let [low, high] = limits;
         let tau_ref = within(tau, limits);
-        let (i, weakens) = self.settled.currents(tau_ref);
-        let i = Dq::new(i.d(), i.q());
+        let (i, weakens) = self.references(tau_ref);
         let near = 1e-9 * high.max(-low);
         let clipped = tau_ref >= high - near || tau_ref <= low + near;
         let below = i.dot(i) < (1.0 - 1e-9) * self.drive.controller.limit.i * self.drive.controller.limit.i;
@@ -185,6 +189,13 @@ impl<'a> At<'a> {
             (false, false) => Region::Mtpa,
         };
         Point { tau_ref, limits, region, weakens, ..self.by_current(i) }
+    }
+
+    /// The current references (A) of the torque `tau` (N.m), which the limits clip, and whether field weakening lowers i_d.
+    #[inline]
+    pub(super) fn references(&self, tau: f64) -> (Dq, bool) {
+        let (i, weakens) = self.settled.currents(within(tau, self.settled.limits()));
+        (Dq::new(i.d(), i.q()), weakens)
     }
 
     /// The point of the current `i_s` (A) at the terminals, as sampled by the controller; its torque reference follows from the
@@ -229,8 +240,8 @@ impl<'a> At<'a> {
         };
         // The current of the flux linkage is the terminal current minus the iron current.
         let tau_e = 1.5 * f64::from(motor.n_p) * psi.cross(i - e * *G);
-        let requested = (i * (R + drop) + e).magnitude() / held;
-        let u_share = share(requested, self.condition.u_dc);
+        let requested = (i * (R + drop) + e) * (1.0 / held);
+        let u_share = share(requested.magnitude(), self.condition.u_dc);
         let tau_ref = controller.motor.torque(i_s.d(), i_s.q());
         self.point(
             Point { tau_ref, limits: self.limits(), i, psi, u, requested, u_share, tau_e, ..Point::default() },
