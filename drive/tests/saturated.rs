@@ -1,12 +1,14 @@
 //! A current loop at the limit of its voltage: the steady state of the algebra beside the means of a settled `PmsmDrive`.
 
 use crate::machines::{self, Machine};
+use crate::random_machines;
 use drive::estimator::Kind;
 use drive::frame::Dq;
 use drive::overmodulation::ModulationMode;
 use drive::plant::tables::PlantParameters;
 use drive::steady::{Condition, Steady};
 use drive::{PmsmDrive, PmsmDriveMean};
+use fmu_core::draw::Draw;
 use fmu_core::log::Warnings;
 use fmu_core::{Block, Elapsed, Step, Warns};
 
@@ -102,4 +104,35 @@ fn overmodulation_is_no_lost_current() {
             "{mode:?}: {said:?}"
         );
     }
+}
+
+/// The same for random machines, from half of the speed at which the EMF takes the whole voltage to 1.1 times that speed.
+#[test]
+fn random_machines_beside_the_drive() {
+    let (mut random, mut saturated, mut errors) = (Draw(7), 0, Vec::new());
+    for machine in random_machines::all() {
+        let (drive, share) = (bare(&machine), random.between(0.5, 1.1));
+        let speed = share * machine.U(1.049) / machine.motor.psi_M / f64::from(machine.motor.n_p);
+        let at = drive.at(&Condition { speed, u_dc: machine.u_dc, temperatures: drive.start_temperatures() });
+        let [low, high] = at.limits();
+        let tau = random.between(low, high);
+        let point = at.by_loop(tau);
+        if drive.fits(&point) {
+            continue;
+        }
+        saturated += 1;
+        let (tau_e, i) = settled(&drive, machine.u_dc, speed, tau);
+        let off = ((tau_e - point.tau_e) / high).abs().max((i - point.i).magnitude() / machine.i);
+        errors.push(off);
+        println!(
+            "{share:.3} {:.3}: {off:.4}, {tau_e} {i:.3?} {} {:.3?} {:?} {}",
+            tau / high,
+            point.tau_e,
+            point.i,
+            machine.motor,
+            machine.i
+        );
+    }
+    errors.sort_by(f64::total_cmp);
+    println!("{saturated} saturated: {errors:.3?}");
 }

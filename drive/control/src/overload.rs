@@ -28,6 +28,11 @@ fn short(x: f64) -> f32 {
     x as f32
 }
 
+/// `x` without the sign of a zero.
+fn unsigned(x: f64) -> f64 {
+    x + 0.0
+}
+
 /// What has been seen.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Overload {
@@ -117,7 +122,7 @@ impl Overload {
     ) {
         let name = if estimated { "speed_est" } else { "the speed" };
         if self.runs_away() {
-            let [low, high] = limits();
+            let [low, high] = limits().map(unsigned);
             log.warn("overload", || {
                 let (or, and) = if estimated {
                     (", or the estimate is wrong", ", and check the controller's data of the machine")
@@ -131,7 +136,7 @@ impl Overload {
                 )
             });
         } else if self.stays(speed_ref) {
-            let [low, high] = limits();
+            let [low, high] = limits().map(unsigned);
             log.warn("speed_ref", || {
                 format!(
                     "speed_ref = {speed_ref} rad/s is not reached: for more than 1 s, {name} has stayed at {speed:.1} rad/s, with the torque at \

@@ -12,7 +12,6 @@
 //! Co-Simulation.
 
 use crate::circuit::Rates;
-use crate::integration::LONGEST_STEP;
 use crate::machine;
 use crate::model::PmsmPlant;
 use crate::power::Energy;
@@ -78,7 +77,7 @@ impl PmsmPlant {
         let speeds = if imposed { [inputs.speed_shaft, end.speed_shaft] } else { [state.speed, self.state.speed] };
         let speed = speeds[0].abs().max(speeds[1].abs());
         let mut left = if self.parameters.is_switched() || self.idles(inputs) {
-            self.count(h, LONGEST_STEP, speed)?
+            self.count(h, self.warm.longest, speed)?
         } else {
             let legs = self.legs(inputs);
             self.substeps(h, speed, &legs, &self.switches(inputs, legs))?

@@ -8,9 +8,6 @@ use crate::model::PmsmPlant;
 use crate::state::{State, axis_at};
 use drive_base::frame::{AlphaBeta, Axis, Rotor, Turn};
 
-/// Longest integration step in s: at 4500 rpm of the reference motor, the current error is less than 2e-6 A.
-pub(super) const LONGEST_STEP: f64 = 100e-6;
-
 /// Largest electrical angle in rad that the rotor turns in an integration step.
 pub(super) const LARGEST_TURN: f64 = 0.25;
 

@@ -4,7 +4,6 @@
 //! the method loses its order, so a step ends where a current enters or leaves the zone +-`inverter.i_zero`.
 
 use crate::circuit::{Circuit, Passed};
-use crate::integration::LONGEST_STEP;
 use crate::legs::Legs;
 use crate::losses::flow::{Drops, Path, Switches};
 use crate::losses::sides::{OneSided, Sides};
@@ -71,7 +70,7 @@ impl PmsmPlant {
         let (parameters, machine) = (&self.parameters, self.machine::<false>());
         let (zone, kinks) = (legs.i_zone(), switches.kinks());
         let time = legs.time(self.warm.least_inductance, parameters.inverter.devices.threshold());
-        let resolved = LONGEST_STEP.min(RESOLVED * time);
+        let resolved = self.warm.longest.min(RESOLVED * time);
         let dissipation = |speed| parameters.dissipation(machine.resistance(), machine.electrical(speed));
         let at_start = dissipation(state.speed);
         let guide = |state: &State, form: &Form| {
@@ -101,7 +100,7 @@ impl PmsmPlant {
         loop {
             let apart = matches!(now, Form::OneSided(_));
             let longest = match now {
-                Form::OneSided(_) => LONGEST_STEP,
+                Form::OneSided(_) => self.warm.longest,
                 _ if resolves => resolved,
                 _ => Self::longest_damped(since, time),
             };

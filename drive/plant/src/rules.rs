@@ -7,15 +7,33 @@ use drive_base::frame::Dq;
 use drive_base::motor::Motor;
 use fmu_core::Fault;
 
+/// Minimum time constant of the current in s.
+const SHORTEST_TIME: f64 = 1e-7;
+
 /// Refuses parameters that contradict each other.
 ///
 /// # Errors
 /// Names the parameter, its value, and what is allowed.
 pub fn validate(parameters: &PlantParameters) -> Result<(), Fault> {
     check_map(parameters)?;
+    check_time_constant(parameters)?;
     check_dead_time(parameters)?;
     check_switched(parameters)?;
     check_network(parameters)
+}
+
+/// Refuses currents that settle so quickly that no machine can have them: a second would take millions of integration steps.
+fn check_time_constant(par: &PlantParameters) -> Result<(), Fault> {
+    let most = par.least_inductance() / SHORTEST_TIME;
+    if par.motor.R_s > most {
+        let allowed = format!(
+            "at most {most:.4} Ohm with {} and {}: a time constant L/R of 0.1 us; check the units",
+            PARAMETERS.tell(par, |p| &mut p.motor.L_d),
+            PARAMETERS.tell(par, |p| &mut p.motor.L_q)
+        );
+        return Err(PARAMETERS.fault(par, |p| &mut p.motor.R_s, allowed));
+    }
+    Ok(())
 }
 
 /// Refuses a dead time that leaves no pulse: a leg switches twice in a period.

@@ -1,7 +1,7 @@
 //! A communication step of the plant: the shaft, the number of integration steps, the gates, the means.
 
 use crate::circuit::{Circuit, Passed, Rates, blocked_rates};
-use crate::integration::{LARGEST_TURN, LONGEST_STEP};
+use crate::integration::LARGEST_TURN;
 use crate::legs::Legs;
 use crate::losses::Losses;
 use crate::losses::flow::{Dissipation, Ideal, Path, Switches};
@@ -53,9 +53,9 @@ impl PmsmPlant {
         let inverter = &self.parameters.inverter;
         let longest = if switches.kinks() {
             // Half a time constant in the zone: kinks are not searched, so the energies need shorter steps.
-            0.5 * LONGEST_STEP.min(legs.time(self.warm.least_inductance, inverter.devices.threshold()))
+            0.5 * self.warm.longest.min(legs.time(self.warm.least_inductance, inverter.devices.threshold()))
         } else {
-            LONGEST_STEP
+            self.warm.longest
         };
         self.count(h, longest, speed)
     }
@@ -157,7 +157,7 @@ impl PmsmPlant {
     fn pass_ideal(&self, h: f64) -> Result<(State, Passed), Fault> {
         let u = self.voltage();
         let mechanics = &self.parameters.mechanics;
-        let is_one = Self::is_one_step(h, self.machine::<true>().electrical(self.state.speed));
+        let is_one = self.is_one_step(h, self.machine::<true>().electrical(self.state.speed));
         if is_one && self.parameters.is_linear() && !mechanics.imposed {
             let (next, step) = self.integrate_linear(&self.state, h, u);
             if mechanics.shorter(h, self.state.speed, next.speed).is_none() {
@@ -171,8 +171,8 @@ impl PmsmPlant {
     #[inline(never)]
     fn pass_ideal_in_steps(&self, h: f64, u: AlphaBeta) -> Result<(State, Passed), Fault> {
         let (mut state, mut passed) = self.at_the_shaft();
-        let is_one = Self::is_one_step(h, self.machine::<true>().electrical(state.speed));
-        let count = if is_one { 1.0 } else { self.count(h, LONGEST_STEP, state.speed)? };
+        let is_one = self.is_one_step(h, self.machine::<true>().electrical(state.speed));
+        let count = if is_one { 1.0 } else { self.count(h, self.warm.longest, state.speed)? };
         let (longest, mut left, mut limit) = (h / count, h, f64::INFINITY);
         while left > 1e-9 * h && !self.is_too_fast(state.speed) {
             let h = if left < longest * (1.0 + 1e-9) { left } else { longest }.min(limit);
@@ -190,8 +190,8 @@ impl PmsmPlant {
 
     /// Whether one integration step suffices for `h` (s) at the electrical speed `w` (rad/s).
     #[inline]
-    fn is_one_step(h: f64, w: f64) -> bool {
-        h <= LONGEST_STEP && w.abs() * h <= LARGEST_TURN
+    fn is_one_step(&self, h: f64, w: f64) -> bool {
+        h <= self.warm.longest && w.abs() * h <= LARGEST_TURN
     }
 
     /// A communication step of `h` (s) with the gates off, with dead time or with losses.

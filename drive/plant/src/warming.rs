@@ -8,8 +8,8 @@ use crate::machine::{Inverse, Machine};
 use crate::model::PmsmPlant;
 use crate::rules;
 use crate::signals::PlantInputs;
-use crate::tables::PARAMETERS;
-use crate::thermal::warm::Warm;
+use crate::tables::{PARAMETERS, PlantParameters};
+use crate::thermal::warm::{LONGEST_STEP, Warm};
 use crate::thermal::{Heat, Temperatures, ThermalMode};
 use drive_base::motor::Motor;
 use fmu_core::{Fault, Interface, Scalar};
@@ -17,6 +17,9 @@ use fmu_core::{Fault, Interface, Scalar};
 /// Remedy if the temperatures of the network leave their valid range.
 const RUNAWAY: &str = "the network became too hot; reduce the current, or raise thermal.G_ws and thermal.G_sc: at constant \
                        current, the winding runs away where winding.alpha p_cu(T_ref) (1/G_ws + 1/G_sc) reaches 1";
+
+/// Integration step as a share of the shortest time constant: the local error of a decay is 2e-5 of it.
+const SHARE_OF_TIME: f64 = 0.3;
 
 impl PmsmPlant {
     /// The temperatures (K) under these `inputs`.
@@ -61,7 +64,19 @@ impl PmsmPlant {
     pub(crate) fn take(&mut self, at: Temperatures) {
         let motor = self.parameters.thermal.motor(&self.parameters.motor, &at);
         let (inverse, ideal) = (Inverse::of(&motor), self.parameters.is_ideal());
-        self.warm = Warm { at, motor, inverse, ideal, ..self.warm };
+        let longest = self.longest_step(&motor);
+        self.warm = Warm { at, motor, inverse, longest, ideal, ..self.warm };
+    }
+
+    /// Maximum integration step in s for this machine: [`LONGEST_STEP`], or a share of its shortest time constant, which is L/R, J/B or the
+    /// reciprocal of the frequency at which inertia and inductance exchange energy.
+    fn longest_step(&self, motor: &Motor) -> f64 {
+        let (PlantParameters { mechanics, inverter, .. }, L) = (&self.parameters, self.warm.least_inductance);
+        let devices = &inverter.devices;
+        let R = motor.R_s + devices.r_transistor.max(devices.r_diode);
+        let exchange = f64::from(motor.n_p) * motor.psi_M * (1.5 / (mechanics.J * L)).sqrt();
+        let mechanical = if mechanics.imposed { 0.0 } else { exchange.max(mechanics.B / mechanics.J) };
+        LONGEST_STEP.min(SHARE_OF_TIME / mechanical.max(R / L))
     }
 
     /// The temperatures (K) given by parameters and `inputs`, and the names of the temperatures of winding and magnets.
