@@ -8,7 +8,7 @@
 //!
 //! i* is the conjugate of the current in the estimated frame. For small theta~ = theta - theta^, s = -theta~ + Im(psi~ /
 //! psi_a), psi~ = psi - psi^: the [tracker](crate::estimator::tracker) follows -s. The feedback v = c r psi_a, with
-//! c = 2 k_1 = R^/2 (1/L_d + 1/L_q) + k_w |w^|, acts along psi_a only, so that the flux error z = psi~ / psi_a obeys
+//! c = 2 k_1 = R^/2 (1/L_d + 1/L_q) + k_w |w^|, at most 1 / T_s, acts along psi_a only, so that the flux error z = psi~ / psi_a obeys
 //!
 //! ```text
 //! dz/dt = -j w z - (R - R^) i / psi_a - c Re z,        poles s^2 + c s + w^2
@@ -40,6 +40,7 @@ use crate::estimator::contract::{ContextOf, Estimate, Estimating, Sample};
 use crate::estimator::resistance::{FILTER, ResistanceParameters, STANDSTILL};
 use crate::estimator::tracker::{Tracker, TrackerParameters};
 use drive_base::frame::{AlphaBeta, Axis, DqHat, Estimated, Turn};
+use drive_base::math::at_most;
 use drive_base::motor::Motor;
 use fmu_core::unit::{ONE, PER_SECOND};
 use fmu_core::{Row, Table, table};
@@ -120,8 +121,10 @@ impl<All: AsRef<FluxObserverParameters> + AsRef<ResistanceParameters> + AsRef<Tr
 
         let w = self.tracker.w;
         self.w_f += T_s * FILTER * (w - self.w_f);
-        let c_0 = 0.5 * R * (1.0 / motor.L_d + 1.0 / motor.L_q);
-        let mut c = c_0 + context.of::<FluxObserverParameters>().k_w * w.abs();
+        // A feedback that takes effect in less than a sample would overshoot: at 2 / T_s, it is unstable.
+        let most = 1.0 / T_s;
+        let c_0 = at_most(0.5 * R * (1.0 / motor.L_d + 1.0 / motor.L_q), most);
+        let mut c = at_most(c_0 + context.of::<FluxObserverParameters>().k_w * w.abs(), most);
         let mut others = 0.0;
         if context.of::<ResistanceParameters>().resistance {
             let asked = sample.speed_ref.map_or(0.0, f64::abs);
@@ -285,6 +288,19 @@ mod tests {
             assert!((observer.v - DqHat::new(-0.01 * c, 0.0)).magnitude() < 1e-9, "{:?} at {w} rad/s", observer.v);
             assert!((observer.w_f - 1e-4 * FILTER * w).abs() < 1e-9, "{} rad/s", observer.w_f);
         }
+    }
+
+    /// A small machine whose L/R is a fifth of the sample period: an error of the flux linkage decays.
+    #[test]
+    fn a_short_time_constant_is_stable() {
+        let motor = Motor { n_p: 1, R_s: 5.0, L_d: 1e-4, L_q: 1e-4, psi_M: 1e-3 };
+        let context = ContextOf { par: &EstimatorParameters::default(), motor: &motor, J: 1e-9, T_s: 1e-4 };
+        let mut observer = FluxObserver::start(&context, &Sample::default(), 0.4, 0.0).0;
+        observer.psi = observer.psi * 1.3;
+        for _ in 0..20 {
+            observer.update(&context, &Sample::default());
+        }
+        assert!((observer.psi.magnitude() / motor.psi_M - 1.0).abs() < 1e-9, "{:?} Wb", observer.psi);
     }
 
     /// dR^/dt = b r rho / (rho^2 + rho_0^2), psi^ += h dR^, and psi_M^ follows -r the less, the more R^ has to do with it.
