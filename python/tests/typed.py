@@ -13,6 +13,7 @@ columns: dict[str, np.ndarray] = plan.run_many({"p.R": [1.0]}, threads=2)
 Plan("x.fmu", connections="by hand")  # wrong
 batch = Batch("x.fmu", 2, actions=["u"], observations=["i"], step_size=1e-4)
 observations: np.ndarray = batch.step([[1.0], [2.0]], repeat=3)
+warned: dict[int, str] = batch.warned
 Batch("x.fmu", 2)  # wrong
 try:
     steps, state = batch.save(0)
