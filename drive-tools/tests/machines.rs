@@ -157,6 +157,24 @@ fn the_sample_period_follows_the_speed() {
     assert!(slow.notes.iter().any(|note| note.contains("2 pi / (w T_s) = 6.1 samples")), "{:?}", slow.notes);
 }
 
+/// The ripple under switched voltages is noted where it is a large part of the maximum current; a higher switching frequency lowers it.
+#[test]
+fn a_ripple_that_the_average_inverter_hides_is_noted() {
+    let ripples = |name: &str, more: &str| {
+        let tuned = rules::fixed(&changed(name, 1.0, more)).unwrap();
+        tuned.notes.into_iter().find(|note| note.contains("currents ripple by up to"))
+    };
+    let noted: Vec<_> = CLASSES.into_iter().filter(|name| ripples(name, "").is_some()).collect();
+    assert!(noted.is_empty(), "{noted:?}");
+    // 24 V / (6 x 0.1815 mH x 4 kHz).
+    let note = ripples("flat-24v", "[inverter]\nf_sw = 4000.0\n").expect("a note");
+    assert!(
+        note.contains("a switching period of 2.5e-4 s") && note.contains("= 5.510 A peak to peak, 0.8 times"),
+        "{note}"
+    );
+    assert_eq!(ripples("flat-24v", "[inverter]\nf_sw = 40000.0\n"), None);
+}
+
 /// The highest speed sets the sample period and field weakening, and is tried.
 #[test]
 fn the_highest_speed_sets_the_sample_period() {

@@ -266,6 +266,27 @@ fn ratings(motor: &MotorFile) -> Result<()> {
 /// Minimum number of samples per electrical period.
 const LEAST_SAMPLES: f64 = 10.0;
 
+/// Share of the maximum current above which the ripple under switched voltages is worth a note.
+const RIPPLED: f64 = 0.5;
+
+/// A note on a current that ripples by much of its maximum, u_dc T / (6 L) from peak to peak at the full voltage, which the average
+/// inverter does not show. Without `inverter.f_sw`, the sample period `T_s` (s) is the switching period.
+fn ripple(motor: &MotorFile, T_s: f64) -> Option<String> {
+    let Data { machine, rating, dc_link, inverter, .. } = &motor.data;
+    let f_sw = inverter.as_ref().and_then(|inverter| inverter.f_sw.as_ref()).map(|f| *f.get_ref());
+    let T = f_sw.map_or(T_s, |f| 1.0 / f);
+    let L = machine.L_d.get_ref().min(*machine.L_q.get_ref());
+    let (ripple, most) = (dc_link.u_dc.get_ref() * T / (6.0 * L), rating.current.get_ref());
+    (ripple > RIPPLED * most).then(|| {
+        format!(
+            "with a switching period of {T:e} s, currents ripple by up to u_dc T / (6 L) = {ripple:.3} A peak to peak, {:.1} times \
+             rating.current; the average inverter does not show it: raise inverter.f_sw and lower control.T_s, or see it with \
+             plant.inverter.mode = Switched",
+            ripple / most
+        )
+    })
+}
+
 /// Checks bandwidths and sample period, for every estimator.
 fn fits(motor: &MotorFile, estimator: Kind, bandwidths: &Bandwidths, notes: &mut Vec<String>) -> Result<()> {
     let Data { machine, rating, .. } = &motor.data;
@@ -298,6 +319,7 @@ fn fits(motor: &MotorFile, estimator: Kind, bandwidths: &Bandwidths, notes: &mut
             bandwidths.T_s.value
         ));
     }
+    notes.extend(ripple(motor, T_s));
     let hertz = bandwidths.current.value / TAU;
     let most = if estimator == Kind::VoltageFeedback { 4300.0 } else { 600.0 };
     if !(60.0..=most).contains(&hertz) {
