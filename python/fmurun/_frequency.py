@@ -95,11 +95,13 @@ def frequency_response(fmus, input, output, *, over=None, frequencies=None, ampl
     if threads is not None and threads < 1:
         raise ValueError(f"threads must be at least 1, not {threads}")
     frequencies = [] if frequencies is None else np.atleast_1d(np.asarray(frequencies, float)).ravel().tolist()
-    frequency, value, amplitudes, checks, doubts = _core.frequency_response(
+    frequency, value, amplitudes, checks, doubts, text = _core.frequency_response(
         plan._core, plan._name(input), plan._name(output), None if over is None else plan._name(over), frequencies,
         None if amplitude is None else float(amplitude), _number("settle_time", settle_time), threads or 0)  # fmt: skip
     if not np.isfinite(value).any():
         raise FmuError(None, None, None, f"frequency_response: {doubts[0]}")
+    if text:
+        warnings.warn(text, stacklevel=2)
     bad = [f"{f:.4g} Hz: {doubt}" for f, doubt in zip(frequency, doubts) if doubt]
     if bad:
         more = f", and {len(bad) - 1} other frequencies" if len(bad) > 1 else ""

@@ -8,7 +8,7 @@ use pyo3::prelude::*;
 use pyo3::types::PyDict;
 
 /// The response of an output at all frequencies: frequencies (Hz), values, amplitudes, the checks (amplitude, settling, step),
-/// and the warnings or the error per frequency.
+/// the doubts or the error per frequency, and the first warning of the FMUs.
 #[pyfunction]
 #[expect(clippy::type_complexity, clippy::too_many_arguments, reason = "Python's arguments and result")]
 pub(crate) fn frequency_response<'py>(
@@ -27,6 +27,7 @@ pub(crate) fn frequency_response<'py>(
     Bound<'py, PyArray1<f64>>,
     [Bound<'py, PyArray1<f64>>; 3],
     Vec<String>,
+    Option<String>,
 )> {
     gate(|| {
         let excitation =
@@ -44,12 +45,14 @@ pub(crate) fn frequency_response<'py>(
             Ok(point) => point.doubts().join("; "),
             Err(error) => error.clone(),
         };
+        let warning = outcomes.iter().find_map(|(_, outcome)| outcome.as_ref().ok()?.warning.clone());
         Ok((
             outcomes.iter().map(|(f, _)| *f).collect::<Vec<f64>>().into_pyarray(py),
             outcomes.iter().map(value).collect::<Vec<Complex64>>().into_pyarray(py),
             of(|point| point.amplitude),
             [of(|point| point.nonlinear), of(|point| point.unsettled), of(|point| point.stepped.unwrap_or(f64::NAN))],
             outcomes.iter().map(doubt).collect(),
+            warning,
         ))
     })
 }

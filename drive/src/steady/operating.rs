@@ -56,9 +56,11 @@ pub struct Point {
     pub psi: Dq,
     /// Voltage at the terminals of the machine in V.
     pub u: Dq,
-    /// Voltage in V requested by the current loop, including the drop of the devices.
-    pub requested: Dq,
-    /// The magnitude of `requested` as a share of u_dc / sqrt 3; 0 without a link voltage.
+    /// Voltage in V of the legs: with the drop of the devices.
+    pub legs: Dq,
+    /// Magnitude in V of the voltage requested by the current loop, including the drop of the devices.
+    pub requested: f64,
+    /// `requested` as a share of u_dc / sqrt 3; 0 without a link voltage.
     pub u_share: f64,
     /// Electromagnetic torque in N.m.
     pub tau_e: f64,
@@ -86,7 +88,7 @@ pub struct At<'a> {
     /// Resistance in Ohm at this speed, and conductance of the iron in S.
     pub(super) R: f64,
     pub(super) G: f64,
-    held: HeldVoltage,
+    pub(super) held: HeldVoltage,
     /// Switching loss in W per ampere of the amplitude.
     sw: f64,
     pub(super) friction: f64,
@@ -164,7 +166,7 @@ impl<'a> At<'a> {
     #[inline]
     pub fn by_reference(&self, tau: f64) -> Point {
         let point = self.of_reference(tau);
-        if point.requested.magnitude() > self.allowed() { self.within_voltage(tau, point) } else { point }
+        if point.requested > self.allowed() { self.within_voltage(tau, point) } else { point }
     }
 
     /// The points of minimum and maximum torque.
@@ -240,11 +242,12 @@ impl<'a> At<'a> {
         };
         // The current of the flux linkage is the terminal current minus the iron current.
         let tau_e = 1.5 * f64::from(motor.n_p) * psi.cross(i - e * *G);
-        let requested = (i * (R + drop) + e) * (1.0 / held);
-        let u_share = share(requested.magnitude(), self.condition.u_dc);
+        let legs = i * (R + drop) + e;
+        let requested = legs.magnitude() / held;
+        let u_share = share(requested, self.condition.u_dc);
         let tau_ref = controller.motor.torque(i_s.d(), i_s.q());
         self.point(
-            Point { tau_ref, limits: self.limits(), i, psi, u, requested, u_share, tau_e, ..Point::default() },
+            Point { tau_ref, limits: self.limits(), i, psi, u, legs, requested, u_share, tau_e, ..Point::default() },
             losses,
         )
     }

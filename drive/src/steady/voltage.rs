@@ -55,7 +55,7 @@ impl Steady {
 }
 
 impl At<'_> {
-    /// As [`Steady::fits`].
+    /// Whether the voltage of the point is within the fundamental of `modulation.mode`, as [`Steady::fits`] says.
     pub fn fits(&self, point: &Point) -> bool {
         self.drive.fits(point)
     }
@@ -110,11 +110,12 @@ impl At<'_> {
         let divided = |u: Dq| Dq::new(u.d() / gains[0], u.q() / gains[1]);
         let (mut i, mut at, mut cut) = (i_ref, self.by_current(i_ref), 0.0);
         let size = self.highest() / gains[0].max(gains[1]);
+        let requested = |point: &Point| point.legs * (1.0 / self.held.share);
         for _ in 0..MAX_ROUNDS {
-            let near = |away: Dq| (self.by_current(i + away).requested - at.requested) * (1.0 / away.magnitude());
+            let near = |away: Dq| (requested(&self.by_current(i + away)) - requested(&at)) * (1.0 / away.magnitude());
             let [d, q] = [Dq::new(NEARBY * size, 0.0), Dq::new(0.0, NEARBY * size)].map(near);
             let off = i_ref - i;
-            let u_ref = at.requested + d * off.d() + q * off.q();
+            let u_ref = requested(&at) + d * off.d() + q * off.q();
             let Some((mu, u)) = limited(u_ref, [d * (1.0 / gains[0]), q * (1.0 / gains[1])], &highest) else { break };
             let next = i_ref - divided(u) * mu;
             let step = (next - i).magnitude();
@@ -130,7 +131,7 @@ impl At<'_> {
     #[cold]
     pub(super) fn within_voltage(&self, tau: f64, at_once: Point) -> Point {
         let allowed = self.allowed();
-        let excess = |point: &Point| point.requested.magnitude() - allowed;
+        let excess = |point: &Point| point.requested - allowed;
         let small = SMALL * allowed;
         if self.trims() {
             let most = GREATEST_TRIM * self.highest();

@@ -79,7 +79,7 @@ pub const DOUBTFUL: f64 = 0.02;
 pub const COARSE: f64 = 0.3;
 
 impl FrequencyPoint {
-    /// Why the values are doubtful; a warning of the FMUs is last.
+    /// Why the values are doubtful.
     pub fn doubts(&self) -> Vec<String> {
         let percent = |x: f64| format!("{:.1} %", 100.0 * x);
         let mut found = Vec::new();
@@ -92,7 +92,6 @@ impl FrequencyPoint {
         if let Some(x) = self.stepped.filter(|x| x.is_nan() || *x > COARSE) {
             found.push(format!("changes by {} with half the communication step", percent(x)));
         }
-        found.extend(self.warning.clone());
         found
     }
 }

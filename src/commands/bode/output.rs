@@ -59,7 +59,7 @@ pub(super) fn check(args: &Bode) -> Result<()> {
     Ok(())
 }
 
-/// Warns of values that a linear, settled system cannot have.
+/// Warns of values that a linear, settled system cannot have, and passes on the first warning of the FMUs.
 pub(super) fn warn(responses: &[Response], probe: &Probe) {
     let at = |text: &str, of: &Response| format!("{} Hz: {text}", four(of.point.frequency));
     let mut doubts: Vec<(String, String)> = Vec::new();
@@ -76,6 +76,8 @@ pub(super) fn warn(responses: &[Response], probe: &Probe) {
             }
         }
     }
+    let warned = responses.iter().filter_map(|of| Some(at(of.point.warning.as_ref()?, of)));
+    doubts.extend(warned.map(|text| (String::new(), text)));
     let mut kinds: Vec<&str> = doubts.iter().map(|(kind, _)| kind.as_str()).collect();
     kinds.sort_unstable();
     kinds.dedup();
