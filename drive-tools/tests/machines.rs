@@ -175,6 +175,21 @@ fn a_ripple_that_the_average_inverter_hides_is_noted() {
     assert_eq!(ripples("flat-24v", "[inverter]\nf_sw = 40000.0\n"), None);
 }
 
+/// With active resistance, the current loop subtracts R^: where w_c L is small, a cold winding would make it oscillate.
+#[test]
+fn the_active_resistance_is_left_out_where_a_cold_winding_would_not_allow_it() {
+    let sensored = |L: &str| {
+        let text = std::fs::read_to_string(file("flat-24v")).unwrap().replace("= 0.1815e-3", &format!("= {L}"));
+        let mut motor = MotorFile::parse(&text, Path::new("flat.toml")).unwrap();
+        motor.choose("Sensored").unwrap();
+        rules::fixed(&motor).unwrap()
+    };
+    let active =
+        |tuned: &Tuned| tuned.controller.iter().find(|s| s.name == "current.active_resistance").unwrap().value.clone();
+    assert_eq!(active(&sensored("0.1815e-3")), Value::Boolean(true));
+    assert_eq!(active(&sensored("0.02e-3")), Value::Boolean(false));
+}
+
 /// The highest speed sets the sample period and field weakening, and is tried.
 #[test]
 fn the_highest_speed_sets_the_sample_period() {

@@ -2,6 +2,7 @@
 #![allow(missing_docs, non_snake_case)]
 
 mod battery;
+mod cold_winding;
 mod commissioning;
 mod coupling;
 mod dc_link;

@@ -14,12 +14,13 @@
 
 use super::bandwidth::Bandwidths;
 use super::check::check;
-use super::motor::{Data, Located, MotorFile, estimators, swing};
+use super::motor::{Data, Located, MotorFile, electrical, estimators, swing};
 use super::setting::{LEVELS, Setting, Suited, Tuned, Unsuited, Value, given, real, set};
 use super::voltage::{self, Voltage};
 use super::{adaptation, flux_map, iron, loops, losses, method, native, plausible, rasmussen, saturation};
 use crate::error::{Error, Result, bail};
 use drive::PmsmPlant;
+use drive::control::current::{COLD, CurrentGains, CurrentLoop};
 use drive::control::tables::ControllerParameters;
 use drive::estimator::{Class, Kind};
 use fmu_core::Block;
@@ -107,6 +108,7 @@ fn suits(
         controller.extend(settings);
         method::weaken(motor, estimator, &mut controller, &mut notes)?;
     }
+    keep_resistance(data, bandwidths, &mut controller);
     let least = |i| saturation::least_inductance(data, fitted.as_ref(), i);
     cap_current_loop(data, bandwidths, least, &mut controller, &mut notes);
     check(&plant, &controller, motor)?;
@@ -332,6 +334,17 @@ fn fits(motor: &MotorFile, estimator: Kind, bandwidths: &Bandwidths, notes: &mut
         notes.push(format!("bandwidth.current is {hertz:.0} Hz; 60 to {most} Hz were tried{why}"));
     }
     Ok(())
+}
+
+/// Leaves out the active resistance where a cold winding would make the current loop oscillate.
+fn keep_resistance(data: &Data, bandwidths: &Bandwidths, controller: &mut [Setting]) {
+    let par = CurrentLoop { bandwidth: bandwidths.current.value, active_resistance: true, ..CurrentLoop::default() };
+    if CurrentGains::tolerates(&par, &electrical(data)) < COLD {
+        for setting in controller.iter_mut().filter(|setting| setting.name == "current.active_resistance") {
+            setting.value = Value::Boolean(false);
+            setting.rule = "R_s is above 6.7 w_c L: with it, the loop would oscillate on a cold winding".into();
+        }
+    }
 }
 
 /// Maximum product of the current loop's gain and T_s / L: half of the value at which the loop oscillates.

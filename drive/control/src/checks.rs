@@ -2,6 +2,7 @@
 
 use crate::battery::DcLimits;
 use crate::commission::CommissionMode;
+use crate::current::{COLD, CurrentGains};
 use crate::estimator::{Class, Kind};
 use crate::position;
 use crate::reference::max_torque;
@@ -317,6 +318,20 @@ pub(crate) fn lowered_i_0(par: &ControllerParameters, u_dc: f64) -> String {
         PARAMETERS.tell(par, |p| &mut p.zero_speed.i_0),
         par.motor.torque_constant() * most
     )
+}
+
+/// A warning about a current loop that subtracts more resistance than a cold winding has.
+pub(crate) fn subtracts(par: &ControllerParameters) -> Option<String> {
+    let tolerated = CurrentGains::tolerates(&par.current, &par.motor);
+    (tolerated < COLD).then(|| {
+        format!(
+            "{} and {}: the loop oscillates if the resistance of the winding is {:.0} % below that, as in a cold one; set \
+             current.active_resistance to false, or raise current.bandwidth",
+            PARAMETERS.tell(par, |p| &mut p.current.active_resistance),
+            PARAMETERS.tell(par, |p| &mut p.motor.R_s),
+            100.0 * tolerated
+        )
+    })
 }
 
 #[cfg(test)]

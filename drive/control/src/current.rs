@@ -80,11 +80,20 @@ impl CurrentGains {
         }
     }
 
+    /// Share of the resistance estimate by which the winding's may be lower; the loop then oscillates. With active resistance, the loop
+    /// subtracts R^ i, so that R^ - R < 2 w_c L must hold; without, it has no such limit.
+    pub fn tolerates(par: &CurrentLoop, motor: &Motor) -> f64 {
+        if par.active_resistance { 2.0 * par.bandwidth * motor.L_d.min(motor.L_q) / motor.R_s } else { f64::INFINITY }
+    }
+
     /// Proportional gains of both axes in V/A.
     pub fn proportional(&self) -> [f64; 2] {
         [self.d.k_p, self.q.k_p]
     }
 }
+
+/// Share of the resistance that a cold winding, and an estimate that is too high, may take.
+pub const COLD: f64 = 0.3;
 
 /// Maximum product of the gain that acts on an error and T_s / L with the lower inductance, in a frame off the rotor: with one sample
 /// of delay, `i[k+2] = i[k+1] - g i[k]` is undamped at g = 1.

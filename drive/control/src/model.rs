@@ -502,6 +502,9 @@ impl SensorlessController {
         if let Some(why) = self.not_caught() {
             log.warn("catch", || why.clone());
         }
+        if let Some(why) = checks::subtracts(par) {
+            log.warn("current.active_resistance", || why.clone());
+        }
         // Where the low-speed law acts.
         if out.enabled && out.speed_est.abs() < par.zero_speed.w_0 && checks::lowers_i_0(par, self.inputs.u_dc) {
             log.warn("limit.i_dc_max", || checks::lowered_i_0(par, self.inputs.u_dc));
