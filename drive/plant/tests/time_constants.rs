@@ -62,6 +62,11 @@ fn the_switched_and_the_lossy_inverter_with_a_short_time_constant() {
         switched.model.parameters.inverter.pwm.mode = InverterMode::Switched;
         let mut mean = 0.0;
         run(&mut switched, 2e-7, 2e-3, |t, block| mean += if t > 1e-3 { 2e-4 * block.out.i.a } else { 0.0 });
+        let mut coarse = plant(R, L, u);
+        coarse.model.parameters.inverter.pwm.mode = InverterMode::Switched;
+        run(&mut coarse, 1e-3, 2e-3, |_, _| {});
+        let [fine, coarse] = [switched, coarse].map(|block| block.out.energy.loss);
+        assert!((coarse / fine - 1.0).abs() < 1e-3, "{coarse} J in steps of 1 ms, not {fine} J");
         let mut lossy = plant(R, L, u);
         let devices = &mut lossy.model.parameters.inverter.devices;
         (devices.r_transistor, devices.r_diode) = (1.0, 1.0);

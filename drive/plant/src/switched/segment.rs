@@ -23,8 +23,8 @@ use crate::state::{State, axis_at};
 use drive_base::frame::{AlphaBeta, Axis, Dq, Phases, Rotor, Stator, Turn, Vector};
 use fmu_core::Scalar;
 
-/// Longest integration step in s.
-const LONGEST: f64 = 50e-6;
+/// Maximum integration step as a share of that of the method of fourth order.
+const SHARE: f64 = 0.5;
 
 /// Largest electrical angle in rad that the rotor turns in an integration step.
 const LARGEST_TURN: f64 = 0.1;
@@ -270,7 +270,7 @@ impl PmsmPlant {
         let mut left = h;
         let watched = search && voltages.watched.contains(&true);
         let w = f64::from(self.warm.motor.n_p) * at.speed;
-        if !watched && h <= LONGEST.min(self.warm.longest) && w.abs() * h <= LARGEST_TURN {
+        if !watched && h <= SHARE * self.warm.longest && w.abs() * h <= LARGEST_TURN {
             let (next, passed) = self.segment(at, h, voltages);
             if self.parameters.mechanics.shorter(h, at.speed, next.speed).is_none() {
                 *at = next;
@@ -280,7 +280,7 @@ impl PmsmPlant {
         let (mut passed, mut limit) = (Passed::default(), f64::INFINITY);
         loop {
             let longest =
-                LONGEST.min(self.warm.longest).min(LARGEST_TURN / (f64::from(self.warm.motor.n_p) * at.speed).abs());
+                (SHARE * self.warm.longest).min(LARGEST_TURN / (f64::from(self.warm.motor.n_p) * at.speed).abs());
             let step = if left <= longest { left } else { left / (left / longest - 1e-9).ceil() }.min(limit);
             let (next, energy) = self.segment(at, step, voltages);
             if let Some(shorter) = self.parameters.mechanics.shorter(step, at.speed, next.speed) {
