@@ -39,7 +39,7 @@ fn settled(drive: &Steady, u_dc: f64, speed: f64, tau: f64) -> (f64, Dq) {
         if k >= 8000 {
             let out = &block.out;
             sum.0 += out.plant.tau_e;
-            sum.1 = sum.1 + Dq::new(out.plant.i_d, out.plant.i_q);
+            sum.1 += Dq::new(out.plant.i_d, out.plant.i_q);
             count += 1.0;
         }
     }

@@ -70,7 +70,9 @@ impl Plan {
                     vec![(k, above), (k + n, below)]
                 };
                 let mut all = all.lock().unwrap_or_else(PoisonError::into_inner);
-                warning.into_iter().for_each(|text| all.0.warned.add(0, text));
+                if let Some(text) = warning {
+                    all.0.warned.add(0, text);
+                }
                 all.1 += count(outcomes.len());
                 for (k, outcome) in outcomes {
                     all.0.put(k, outcome);

@@ -429,7 +429,9 @@ impl Plan {
                 for (index, (outcome, warning)) in range.clone().zip(outcomes) {
                     all.0.put(usize::try_from(index).unwrap_or(usize::MAX), outcome);
                     all.0.warned.asked += u64::from(Warned::asks(index, count));
-                    warning.into_iter().for_each(|text| all.0.warned.add(index, text));
+                    if let Some(text) = warning {
+                        all.0.warned.add(index, text);
+                    }
                 }
                 all.1 += range.end - range.start;
                 let done = all.1;

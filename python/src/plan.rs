@@ -115,12 +115,7 @@ impl Plan {
 
     /// Run rows, known by the numbers `runs`: columns of the measures, times reached, errors, a sentence about warnings of the FMUs. 0
     /// threads means all cores.
-    #[expect(
-        clippy::type_complexity,
-        clippy::too_many_arguments,
-        clippy::needless_pass_by_value,
-        reason = "Python's arguments and result; PyO3 extracts values"
-    )]
+    #[expect(clippy::type_complexity, clippy::needless_pass_by_value, reason = "Python's; PyO3 extracts values")]
     fn run_many<'py>(
         &self,
         py: Python<'py>,
