@@ -221,7 +221,7 @@ fn a_rotor_that_the_controller_believes_to_have_is_reported() {
     }
 }
 
-/// A drive that is lost because its torque follows more slowly than the speed loop asks is told so, not that its machine's data are wrong.
+/// If a drive is lost and its current loop is slower than its speed loop, the message names the bandwidths instead of the machine's data.
 #[test]
 fn a_current_loop_slower_than_the_speed_loop_is_named() {
     for estimator in [Kind::Rasmussen, Kind::Sensored] {

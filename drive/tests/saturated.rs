@@ -83,7 +83,7 @@ fn the_current_of_a_saturated_loop() {
 
 /// Overmodulation uses more than the voltage of a sinusoid, and `PmsmDriveMean` does not take that for a current that it cannot hold.
 #[test]
-fn overmodulation_is_no_lost_current() {
+fn overmodulation_is_not_reported_as_a_lost_current() {
     for mode in [ModulationMode::MinimumPhase, ModulationMode::MinimumMagnitude, ModulationMode::SixStep] {
         let mut block = Block::<PmsmDriveMean>::default();
         let controller = &mut block.model.drive.controller;
@@ -109,7 +109,7 @@ fn overmodulation_is_no_lost_current() {
 /// The same for random machines, from half of the speed at which the EMF takes the whole voltage to 1.1 times that speed.
 #[test]
 fn random_machines_beside_the_drive() {
-    let (mut random, mut saturated, mut errors) = (Draw(7), 0, Vec::new());
+    let (mut random, mut errors) = (Draw(7), Vec::new());
     for machine in random_machines::all() {
         let (drive, share) = (bare(&machine), random.between(0.5, 1.1));
         let speed = share * machine.U(1.049) / machine.motor.psi_M / f64::from(machine.motor.n_p);
@@ -120,19 +120,13 @@ fn random_machines_beside_the_drive() {
         if drive.fits(&point) {
             continue;
         }
-        saturated += 1;
         let (tau_e, i) = settled(&drive, machine.u_dc, speed, tau);
         let off = ((tau_e - point.tau_e) / high).abs().max((i - point.i).magnitude() / machine.i);
+        let allowed = if point.i.magnitude() > 0.999 * machine.i { 0.16 } else { 0.04 };
+        assert!(off < allowed, "{:?}, {share}, {tau} N.m: {tau_e} N.m, {i:?} A, not {point:?}", machine.motor);
         errors.push(off);
-        println!(
-            "{share:.3} {:.3}: {off:.4}, {tau_e} {i:.3?} {} {:.3?} {:?} {}",
-            tau / high,
-            point.tau_e,
-            point.i,
-            machine.motor,
-            machine.i
-        );
     }
     errors.sort_by(f64::total_cmp);
-    println!("{saturated} saturated: {errors:.3?}");
+    println!("{} saturated: {errors:.4?}", errors.len());
+    assert!(errors.len() > 60 && errors[errors.len() / 2] < 0.005 && errors[errors.len() * 9 / 10] < 0.02);
 }

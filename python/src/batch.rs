@@ -23,8 +23,8 @@ struct Lanes {
     /// Start values by variable, one for all lanes or one per lane.
     ports: Ports,
     values: Vec<Vec<f64>>,
-    /// Python has been told of a warning since the last initialization.
-    told: bool,
+    /// A warning has been reported to Python since the last initialization.
+    reported: bool,
 }
 
 /// Start values from Python: names, and for each one value or one for each lane.
@@ -67,7 +67,7 @@ impl Lanes {
             let (names, values): (Vec<_>, Vec<_>) = start.into_iter().unzip();
             self.ports = Ports::find(&self.opened.fmu, &names)?;
             self.values = values;
-            self.told = false;
+            self.reported = false;
         }
         let all = renew(&mut self.opened, &mut self.all)?;
         let Self { all: lanes, common, opened, ports, values, .. } = self;
@@ -83,7 +83,7 @@ impl Lanes {
 
     /// The first warning, once after each initialization.
     fn news(&mut self) -> Option<String> {
-        if self.told || !self.common.news.swap(false, Ordering::Relaxed) {
+        if self.reported || !self.common.news.swap(false, Ordering::Relaxed) {
             return None;
         }
         let mut warnings = self.all.iter().filter_map(|lane| lane.warning.as_ref());
@@ -92,7 +92,7 @@ impl Lanes {
             0 => first.clone(),
             more => format!("{first}; and {more} of the other instances: `warned` has their warnings"),
         };
-        self.told = true;
+        self.reported = true;
         Some(text)
     }
 }
@@ -150,7 +150,7 @@ impl Batch {
                 let lanes = (0..n).map(|k| Lane::new(name(k), k % 16 == 0)).collect();
                 let ports = Ports::find(&opened.fmu, &[])?;
                 let values = Vec::new();
-                let mut lanes = Lanes { opened, common, all: lanes, threads, ports, values, told: false };
+                let mut lanes = Lanes { opened, common, all: lanes, threads, ports, values, reported: false };
                 lanes.reset(None, Some(start_values))?;
                 Ok(lanes)
             };
@@ -178,7 +178,7 @@ impl Batch {
                 return Err(PyValueError::new_err(format!("the mask must have {} elements", self.n)));
             }
             let observed = py.detach(|| self.lanes().reset(mask.as_deref(), start_values)).map_err(raise)?;
-            self.tell(py, 2)?;
+            self.report(py, 2)?;
             self.shaped(py, observed)
         })
     }
@@ -213,7 +213,7 @@ impl Batch {
             if let Some(error) = error {
                 return Err(raise(error));
             }
-            self.tell(py, 1)?;
+            self.report(py, 1)?;
             let Some(out) = out else { return self.shaped(py, observed) };
             let mut target = out.try_readwrite().map_err(|e| PyValueError::new_err(format!("out: {e}")))?;
             target.as_array_mut().iter_mut().zip(observed).for_each(|(x, y)| *x = y);
@@ -229,8 +229,8 @@ impl Batch {
         })
     }
 
-    /// The first warning of each instance that warned since its last initialization, by its number. Every 16th instance is asked in
-    /// all steps, the others only in the first after an initialization: looking for warnings takes time.
+    /// The first warning of each instance that warned since its last initialization, by its number. Every 16th instance is checked
+    /// in all steps, the others only in the first step after an initialization, because the checks take time.
     #[getter]
     fn warned(&self) -> BTreeMap<usize, String> {
         self.lanes().all.iter().enumerate().filter_map(|(k, lane)| Some((k, lane.warning.clone()?))).collect()
@@ -268,8 +268,8 @@ impl Batch {
         self.lanes.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
-    /// Gives the first warning to Python, for a caller this many frames above.
-    fn tell(&self, py: Python<'_>, frames: i32) -> PyResult<()> {
+    /// Reports the first warning to Python, at the caller this many frames above.
+    fn report(&self, py: Python<'_>, frames: i32) -> PyResult<()> {
         let Some(text) = self.lanes().news() else { return Ok(()) };
         let text = CString::new(text.replace('\0', " ")).unwrap_or_default();
         PyErr::warn(py, &py.get_type::<PyUserWarning>(), &text, frames)

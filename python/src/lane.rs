@@ -73,7 +73,7 @@ pub(crate) struct Common {
     pub(crate) step: f64,
     /// The FMU can save and set its state.
     pub(crate) states: bool,
-    /// A lane has a warning that Python has not been given.
+    /// A lane has a warning that has not been reported to Python.
     pub(crate) news: AtomicBool,
 }
 
@@ -89,10 +89,10 @@ pub(crate) struct Lane {
     pub(crate) error: Option<Error>,
     /// The first warning since the last initialization.
     pub(crate) warning: Option<String>,
-    /// The FMU is asked for warnings in all steps, otherwise only in the first after an initialization: looking for them can take a
-    /// third of a short step.
+    /// The FMU logs warnings in all steps, otherwise only in the first step after an initialization: its checks can take a third of a
+    /// short step.
     asks: bool,
-    /// The FMU is asked for warnings now.
+    /// The FMU logs warnings now.
     asked: bool,
 }
 

@@ -1,4 +1,4 @@
-"""Warnings of an FMU reach whoever runs it, by whatever function."""
+"""Every function that runs an FMU passes on its warnings."""
 
 import warnings
 
@@ -19,7 +19,7 @@ def drive(standard):
 
 
 def heard(function):
-    """The texts of the warnings that a function gives."""
+    """Texts of the warnings raised by a function."""
     with warnings.catch_warnings(record=True) as caught:
         warnings.simplefilter("always")
         function()
@@ -65,10 +65,10 @@ def test_a_batch_warns_once_and_keeps_all(drive):
     assert len(texts) == 1 and texts[0].startswith("PmsmDrive[3]: at 0.001 s: controller.motor.R_s = 18 Ohm is 9 times")
     assert texts[0].endswith("; and 1 of the other instances: `warned` has their warnings")
     assert list(batch.warned) == [3, 20] and batch.warned[20].startswith("PmsmDrive[20]: ")
-    # A return to the start keeps the parameters, so the warnings remain and are not given again.
+    # A reset without start values keeps the parameters: the warnings remain and are not reported again.
     assert not heard(lambda: batch.reset([k == 3 for k in range(40)])) and list(batch.warned) == [3, 20]
     assert not heard(lambda: batch.reset(start_values={"tau_load": 0.5})) and not batch.warned
-    # An instance that is asked in all steps: number 16 meets a load beyond the torque later.
+    # Instances 0 and 16 are checked in all steps: a load beyond the torque, applied later, is reported.
     late = Batch(drive, 17, actions=["tau_load"], observations=["speed"], step_size=1e-3)
     late.reset()
     assert not heard(lambda: [late.step(np.zeros((17, 1))) for _ in range(5)])
@@ -82,7 +82,7 @@ def test_a_batch_of_one_warns_while_it_runs(drive):
     batch.reset()
     with pytest.warns(UserWarning, match="^PmsmDrive: at 0.*tau_load = 500 N.m"):
         [batch.step(np.array([500.0])) for _ in range(50)]
-    # As an error it is the caller's, and the batch goes on.
+    # Python can turn the warning into an error; the batch can still step after it.
     batch.reset(start_values={})
     with warnings.catch_warnings():
         warnings.simplefilter("error")

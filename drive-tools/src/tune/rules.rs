@@ -268,11 +268,11 @@ fn ratings(motor: &MotorFile) -> Result<()> {
 /// Minimum number of samples per electrical period.
 const LEAST_SAMPLES: f64 = 10.0;
 
-/// Share of the maximum current above which the ripple under switched voltages is worth a note.
+/// Share of the maximum current above which a ripple is noted.
 const RIPPLED: f64 = 0.5;
 
-/// A note on a current that ripples by much of its maximum, u_dc T / (6 L) from peak to peak at the full voltage, which the average
-/// inverter does not show. Without `inverter.f_sw`, the sample period `T_s` (s) is the switching period.
+/// Notes a current ripple above [`RIPPLED`]: u_dc T / (6 L) from peak to peak at the full voltage, measured with the switched plant. The
+/// average inverter does not show it. Without `inverter.f_sw`, the sample period `T_s` (s) is the switching period.
 fn ripple(motor: &MotorFile, T_s: f64) -> Option<String> {
     let Data { machine, rating, dc_link, inverter, .. } = &motor.data;
     let f_sw = inverter.as_ref().and_then(|inverter| inverter.f_sw.as_ref()).map(|f| *f.get_ref());

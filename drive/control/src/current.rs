@@ -80,8 +80,8 @@ impl CurrentGains {
         }
     }
 
-    /// Share of the resistance estimate by which the winding's may be lower; the loop then oscillates. With active resistance, the loop
-    /// subtracts R^ i, so that R^ - R < 2 w_c L must hold; without, it has no such limit.
+    /// Maximum share by which the resistance of the winding may be below the estimate R^ before the loop oscillates. With active
+    /// resistance, the loop subtracts R^ i and is stable for R^ - R < 2 w_c L; otherwise there is no such limit.
     pub fn tolerates(par: &CurrentLoop, motor: &Motor) -> f64 {
         if par.active_resistance { 2.0 * par.bandwidth * motor.L_d.min(motor.L_q) / motor.R_s } else { f64::INFINITY }
     }
@@ -92,7 +92,7 @@ impl CurrentGains {
     }
 }
 
-/// Share of the resistance that a cold winding, and an estimate that is too high, may take.
+/// Share by which the resistance of a cold winding can be below the estimate, 20 % at -30 degC, with a margin for the estimate itself.
 pub const COLD: f64 = 0.3;
 
 /// Maximum product of the gain that acts on an error and T_s / L with the lower inductance, in a frame off the rotor: with one sample

@@ -28,7 +28,7 @@ fn short(x: f64) -> f32 {
     x as f32
 }
 
-/// `x` without the sign of a zero.
+/// `x`, with -0 replaced by 0.
 fn unsigned(x: f64) -> f64 {
     x + 0.0
 }

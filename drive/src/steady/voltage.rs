@@ -17,8 +17,8 @@
 //! part along i: the same equation with a lower i_ref, of the same direction, for which |i| is the limit.
 //!
 //! Since u_d falls with i_q, i_d rises, and with saliency the torque is far below the maximum at this voltage. That maximum is the
-//! torque of a lower reference: [`At::by_reference`] looks for it, for the voltage of a sinusoid, and [`At::by_loop`] has what the drive
-//! does. Derived here.
+//! torque of a lower reference: [`At::by_reference`] searches for it, within the voltage of a sinusoid, and [`At::by_loop`] returns the state of
+//! the drive. Derived here; u in V, i in A, K_p in V/A, A in Ohm.
 
 use super::drive::Steady;
 use super::operating::{At, Point, Region};
@@ -39,11 +39,11 @@ const GOLDEN: f64 = 0.618_033_988_749_894_8;
 /// Relative tolerance of the maximum voltage.
 const TOLERANCE: f64 = 1e-6;
 
-/// Rounds of Newton's method for a loop that saturates, and the difference of its derivatives, as a share of U / K_p.
+/// Maximum number of rounds of Newton's method, and the step of its difference quotients as a share of U / K_p.
 const MAX_ROUNDS: u32 = 20;
 const NEARBY: f64 = 1e-4;
 
-/// The first mu that is tried, in time constants of the machine and the loop, and the number of doublings.
+/// First mu of the search as a share of the reciprocal of M's magnitude, and the maximum number of doublings.
 const FIRST: f64 = 1e-3;
 const DOUBLINGS: u32 = 60;
 

@@ -121,7 +121,7 @@ impl<All: AsRef<FluxObserverParameters> + AsRef<ResistanceParameters> + AsRef<Tr
 
         let w = self.tracker.w;
         self.w_f += T_s * FILTER * (w - self.w_f);
-        // A feedback that takes effect in less than a sample would overshoot: at 2 / T_s, it is unstable.
+        // Above 1 / T_s, the feedback overshoots; from 2 / T_s on, it is unstable.
         let most = 1.0 / T_s;
         let c_0 = at_most(0.5 * R * (1.0 / motor.L_d + 1.0 / motor.L_q), most);
         let mut c = at_most(c_0 + context.of::<FluxObserverParameters>().k_w * w.abs(), most);
